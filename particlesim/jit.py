@@ -1,0 +1,62 @@
+"""The one decorator under which every kernel is compiled, and the cache in which the result is kept.
+
+Numba's on-disk cache notices a change in the file of a kernel but not in the files of the kernels that it calls.
+The cache folder is therefore named after a digest of all kernel sources: a stale kernel cannot be run, and a
+package installed read-only still has a cache.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+
+_PACKAGE = Path(__file__).parent
+
+
+def _source_digest() -> str:
+    digest = hashlib.sha256()
+    for path in sorted(_PACKAGE.rglob("*.py")):
+        source = path.read_bytes()
+        if b"kernel" in source or path.name == "constants.py":
+            digest.update(source)
+    return digest.hexdigest()[:16]
+
+
+def _cache_folder() -> str:
+    """The folder for compiled kernels: NUMBA_CACHE_DIR if set, else the user's cache, else a temporary folder."""
+    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    folder = Path(base) / "particlesim" / f"kernels-{_source_digest()}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError:
+        folder = Path(tempfile.gettempdir()) / f"particlesim-kernels-{_source_digest()}-{os.getuid()}"
+        folder.mkdir(parents=True, exist_ok=True)
+    return str(folder)
+
+
+CACHE_FOLDER = _cache_folder()
+
+
+def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False) -> Any:
+    """Compile ``function`` for the machine: cached on disk, without the GIL, IEEE arithmetic (no fastmath).
+
+    ``parallel=True`` allows ``numba.prange``; such a kernel writes only to the slot of its own index, so its
+    result does not depend on the number of threads.
+    """
+    if function is None:
+        return lambda wrapped: kernel(wrapped, parallel=parallel)
+    # The place of a function's cache is settled when it is decorated; other users of numba keep theirs.
+    elsewhere = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = CACHE_FOLDER
+    try:
+        return numba.njit(cache=True, nogil=True, parallel=parallel, error_model="numpy")(function)
+    finally:
+        numba.config.CACHE_DIR = elsewhere
