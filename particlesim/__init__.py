@@ -1,0 +1,82 @@
+"""particlesim: from a scene file to a movie of particles that bounce as physics says they do, without a screen.
+
+    import particlesim as ps
+
+    scene = ps.load_scene("scenes/mixed_box.toml")
+    ps.render(scene, "movie.mp4")
+
+Conventions, everywhere: SI units; right-handed axes, z up; quaternions (w, x, y, z) of unit length, from body to
+world axes; angular velocity and momentum in world axes; contact normals point from the first body to the second; a
+separation below 0 is an overlap; arrays are named by what they hold, such as ``position (n, 3) float64 [m]``.
+
+Names are loaded when they are first used: a simulation does not need OpenGL, and ``--help`` needs neither.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from particlesim.broad_phase import find_pairs
+    from particlesim.ledger import Ledger
+    from particlesim.narrow_phase import Pose, Separation, separation
+    from particlesim.pipeline import render, simulate
+    from particlesim.render import RenderError
+    from particlesim.scene import Scene
+    from particlesim.scene.file import SceneError, load_scene
+    from particlesim.shapes import CATALOGUE, Shape
+    from particlesim.simulation import Simulation, SimulationError
+    from particlesim.trajectory import Trajectory, TrajectoryError
+
+_HOMES = {
+    "CATALOGUE": "shapes",
+    "Ledger": "ledger",
+    "Pose": "narrow_phase",
+    "RenderError": "render",
+    "Scene": "scene",
+    "SceneError": "scene.file",
+    "Separation": "narrow_phase",
+    "Shape": "shapes",
+    "Simulation": "simulation",
+    "SimulationError": "simulation",
+    "Trajectory": "trajectory",
+    "TrajectoryError": "trajectory",
+    "find_pairs": "broad_phase",
+    "load_scene": "scene.file",
+    "render": "pipeline",
+    "separation": "narrow_phase",
+    "simulate": "pipeline",
+}
+
+__all__ = [
+    "CATALOGUE",
+    "Ledger",
+    "Pose",
+    "RenderError",
+    "Scene",
+    "SceneError",
+    "Separation",
+    "Shape",
+    "Simulation",
+    "SimulationError",
+    "Trajectory",
+    "TrajectoryError",
+    "find_pairs",
+    "load_scene",
+    "render",
+    "separation",
+    "simulate",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'particlesim' has no attribute '{name}'")
+    value = getattr(importlib.import_module(f"particlesim.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -26,3 +26,24 @@ PATCH_TOLERANCE = 1e-6
 
 # An octagon: the most points a contact patch keeps; more do not change the impulse, whose first point is their mean.
 MAX_MANIFOLD = 8
+
+# Under gravity a particle that meets something more slowly than a fall from this fraction of its inscribed radius
+# rebounds in full, whatever its restitution: its bounces would become infinitely many in finite time.  What is left
+# is a tremble of a thousandth of its size that neither gains nor loses energy; it does not sink.
+RESTING_DROP = 1e-3
+
+# Rounds of impacts within one time step before what still approaches is left to the next step and counted.
+MAX_ROUNDS = 200
+
+# Impulses given to one patch in one impact: its middle, then whichever corner still approaches.
+MAX_PATCH_IMPULSES = 64
+
+# Slower than this fraction of the surface speeds involved, a contact does not approach: it is rounding.
+APPROACH_TOLERANCE = 1e-12
+
+# An impact is placed where the separation is between 0 and this fraction of the particles' sizes: an order above the
+# rounding of positions in a world a thousand sizes wide, so that the particles are apart when they go on.
+IMPACT_TOLERANCE = 1e-12
+
+# Loops over fewer items than this run on one thread: waking another takes longer [about 20 us].
+SERIAL_BELOW = 2048

@@ -45,6 +45,10 @@ def _cache_folder() -> str:
 CACHE_FOLDER = _cache_folder()
 
 
+# What numba would otherwise turn into parallel loops by itself.
+_AUTOMATIC = ("comprehension", "reduction", "inplace_binop", "setitem", "numpy", "stencil")
+
+
 def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False) -> Any:
     """Compile ``function`` for the machine: cached on disk, without the GIL, IEEE arithmetic (no fastmath).
 
@@ -53,10 +57,12 @@ def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False
     """
     if function is None:
         return lambda wrapped: kernel(wrapped, parallel=parallel)
+    # Only the loops written with prange: small array expressions are not worth waking a thread for.
+    options: Any = dict.fromkeys(_AUTOMATIC, False) | {"prange": True} if parallel else False
     # The place of a function's cache is settled when it is decorated; other users of numba keep theirs.
     elsewhere = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = CACHE_FOLDER
     try:
-        return numba.njit(cache=True, nogil=True, parallel=parallel, error_model="numpy")(function)
+        return numba.njit(cache=True, nogil=True, parallel=options, error_model="numpy")(function)
     finally:
         numba.config.CACHE_DIR = elsewhere

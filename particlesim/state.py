@@ -33,12 +33,12 @@ class State(NamedTuple):
     position: np.ndarray  # (n, 3) centroid [m]
     orientation: np.ndarray  # (n, 4) unit quaternion, body to world
     velocity: np.ndarray  # (n, 3) [m/s]
-    angular_velocity: np.ndarray  # (n, 3) world axes [rad/s]
+    angular_momentum: np.ndarray  # (n, 3) about the centroid, world axes [kg m^2/s]
     image: np.ndarray  # (n, 3) int64, how often it left a periodic world by its upper faces
 
 
 class Particles(NamedTuple):
-    """Constants and state side by side, as a script sees them: views, not copies."""
+    """Constants and state side by side, as a script sees them."""
 
     shape: np.ndarray
     group: np.ndarray
@@ -51,8 +51,9 @@ class Particles(NamedTuple):
     position: np.ndarray
     orientation: np.ndarray
     velocity: np.ndarray
-    angular_velocity: np.ndarray
+    angular_momentum: np.ndarray
     image: np.ndarray
+    angular_velocity: np.ndarray  # (n, 3) world axes [rad/s], computed from the angular momentum
 
 
 class World(NamedTuple):

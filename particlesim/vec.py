@@ -120,8 +120,12 @@ def quaternion_of(rotation_vector):
 
 @kernel
 def rotate(q, v):
-    """Vector v in body axes, seen in world axes."""
-    t = scaled(cross((q[1], q[2], q[3]), v), 2.0)
+    """Vector v in body axes, seen in world axes.
+
+    Divided by |q|^2: a quaternion is of unit length only to rounding, which would stretch v a little each time.
+    """
+    length2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
+    t = scaled(cross((q[1], q[2], q[3]), v), 2.0 / length2)
     return along(add(v, cross((q[1], q[2], q[3]), t)), t, q[0])
 
 

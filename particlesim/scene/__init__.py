@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from particlesim.scene.base import Model, Positive
 from particlesim.scene.groups import Group
@@ -29,7 +29,16 @@ class Scene(Model):
     movie: Movie = Field(default_factory=Movie)
     camera: Camera = Field(default_factory=lambda: FixedCamera(kind="fixed"))
     show: Show = Field(default_factory=Show)
-    folder: Path = Field(default=Path(), exclude=True, repr=False)  # where relative paths of the scene start
+    _folder: Path = PrivateAttr(default_factory=Path)
+
+    @property
+    def folder(self) -> Path:
+        """Where relative paths of the scene start: the folder of its file."""
+        return self._folder
+
+    def set_folder(self, folder: Path) -> None:
+        """Let relative paths start at ``folder``."""
+        self._folder = folder
 
     @property
     def number(self) -> int:

@@ -51,9 +51,7 @@ class OrbitCamera(Model):
         return self
 
 
-Camera = Annotated[
-    FixedCamera | LookAtCamera | OrbitCamera, Field(discriminator="kind"), shorthand("", None, str)
-]
+Camera = Annotated[FixedCamera | LookAtCamera | OrbitCamera, Field(discriminator="kind"), shorthand("", None, str)]
 
 
 def _even(value: int) -> int:

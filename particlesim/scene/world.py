@@ -47,7 +47,7 @@ class Octree(Model):
 class Solver(Model):
     """How the motion is computed. None of it changes which pairs meet."""
 
-    broad_phase: Annotated[
-        Naive | Grid | Octree, Field(discriminator="kind"), shorthand("", None, str)
-    ] = Field(default_factory=lambda: Octree(kind="octree"))
+    broad_phase: Annotated[Naive | Grid | Octree, Field(discriminator="kind"), shorthand("", None, str)] = Field(
+        default_factory=lambda: Octree(kind="octree")
+    )
     time_step: Literal["auto"] | Positive = "auto"  # [s]

@@ -1,0 +1,80 @@
+"""Where a box belongs in the octree, as one number: its size class, then its octant level by level.
+
+The octants are interleaved bits of the centre's coordinates: the code of G. M. Morton, "A Computer Oriented Geodetic
+Data Base and a New Technique in File Sequencing", IBM, 1966.  Sorted by code, the boxes of every node of the tree
+are one range.
+"""
+
+from __future__ import annotations
+
+from particlesim.broad_phase.survey import wrapped_centre
+from particlesim.jit import kernel
+
+# Levels of octants in a code, three bits each; three bits for the size class stand above them.
+LEVELS = 20
+CLASS_SHIFT = 3 * LEVELS
+CODE_BITS = CLASS_SHIFT + 3
+
+# Classes of boxes by their longest edge: the largest and those down to a quarter of it, down to a sixteenth, ...
+# A large box among small ones would stretch its leaf over many others; in a tree of its own size it does not.
+CLASS_RATIO = 4.0
+_LAST_CLASS = 7
+
+
+@kernel
+def _spread(number):
+    """Bits of a 20-bit number moved to every third place."""
+    number = (number | number << 32) & 0x1F00000000FFFF
+    number = (number | number << 16) & 0x1F0000FF0000FF
+    number = (number | number << 8) & 0x100F00F00F00F00F
+    number = (number | number << 4) & 0x10C30C30C30C30C3
+    return (number | number << 2) & 0x1249249249249249
+
+
+@kernel
+def octants(x, y, z):
+    """Code of a point in the unit cube; a point outside is taken as the nearest inside."""
+    last = 2.0**LEVELS - 1.0
+    return (
+        _spread(int(min(max(x * 2.0**LEVELS, 0.0), last)))
+        | _spread(int(min(max(y * 2.0**LEVELS, 0.0), last))) << 1
+        | _spread(int(min(max(z * 2.0**LEVELS, 0.0), last))) << 2
+    )
+
+
+@kernel
+def size_class(width, widest):
+    """0 for the largest boxes, 7 for all that are at most 4**-7 of the widest."""
+    found = 0
+    bound = widest / CLASS_RATIO
+    while width <= bound and found < _LAST_CLASS:
+        found += 1
+        bound /= CLASS_RATIO
+    return found
+
+
+@kernel
+def fill_codes(first, last, lower, upper, period, origin, inverse, widest, codes, order):
+    """Codes of boxes ``first .. last`` in a root cube at ``origin`` (3,) [m] of edge 1 / ``inverse`` [m]."""
+    for index in range(first, last):
+        width = 0.0
+        for axis in range(3):
+            width = max(width, upper[index, axis] - lower[index, axis])
+        code = octants(
+            (wrapped_centre(lower[index, 0], upper[index, 0], period[0]) - origin[0]) * inverse,
+            (wrapped_centre(lower[index, 1], upper[index, 1], period[1]) - origin[1]) * inverse,
+            (wrapped_centre(lower[index, 2], upper[index, 2], period[2]) - origin[2]) * inverse,
+        )
+        codes[index] = size_class(width, widest) << CLASS_SHIFT | code
+        order[index] = index
+
+
+@kernel
+def fill_octants(points, lower, inverse, codes):
+    """Codes of ``points`` (n, 3) in a box at ``lower`` (3,) of edges 1 / ``inverse`` (3,)."""
+    for index in range(points.shape[0]):
+        codes[index] = octants(
+            (points[index, 0] - lower[0]) * inverse[0],
+            (points[index, 1] - lower[1]) * inverse[1],
+            (points[index, 2] - lower[2]) * inverse[2],
+        )

@@ -1,0 +1,34 @@
+"""What this machine has for simulating and drawing."""
+
+from __future__ import annotations
+
+import platform
+from typing import NamedTuple
+
+import numba
+
+from particlesim.jit import CACHE_FOLDER
+from particlesim.render import RenderError, describe, describe_ffmpeg
+
+
+class Finding(NamedTuple):
+    """One thing looked at: its name, whether it is there, and what it is or how to get it."""
+
+    what: str
+    good: bool
+    text: str
+
+
+def diagnose() -> list[Finding]:
+    """Look at everything a movie needs."""
+    findings = [
+        Finding("python", True, platform.python_version()),
+        Finding("numba", True, f"{numba.__version__}, {numba.config.NUMBA_NUM_THREADS} threads"),
+        Finding("kernel cache", True, CACHE_FOLDER),
+    ]
+    for what, look in (("OpenGL", describe), ("ffmpeg", describe_ffmpeg)):
+        try:
+            findings.append(Finding(what, True, look()))
+        except RenderError as error:
+            findings.append(Finding(what, False, str(error)))
+    return findings

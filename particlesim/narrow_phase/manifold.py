@@ -1,0 +1,129 @@
+"""Where two hulls touch: the patch, segment or point that their facing features share."""
+
+import math
+
+import numpy as np
+
+from particlesim.constants import MAX_MANIFOLD, PARALLEL_TOLERANCE, PATCH_TOLERANCE
+from particlesim.jit import kernel
+from particlesim.shapes import MAX_MESH_VERTICES
+from particlesim.vec import add, along, apply, apply_transposed, cross, dot, norm, put, row, scaled, sub
+
+# A polygon clipped by a polygon has at most the corners of both.
+_MAX_CORNERS = 2 * MAX_MESH_VERTICES
+
+# Corners this far outside a face, as a fraction of its size, still lie on it: rounding, and edges that coincide.
+_ON_EDGE = 1e-9
+
+
+@kernel
+def _facing_feature(table, shape, size, matrix, offset, direction, feature):
+    """Write the face, edge or vertex of a hull that faces ``direction``; returns (corners, whether it is a face)."""
+    local = apply_transposed(matrix, direction)
+    start = table.vertex_start[shape]
+    for f in range(table.face_start[shape], table.face_start[shape + 1]):
+        n = row(table.face_normal, f)
+        if dot(n, local) > 0.0 and norm(cross(n, local)) < PARALLEL_TOLERANCE:
+            first, last = table.loop_start[f], table.loop_start[f + 1]
+            for k in range(first, last):
+                v = row(table.vertex, start + table.loop[k])
+                put(feature, k - first, add(offset, apply(matrix, scaled(v, size))))
+            return last - first, True
+    best, second = start, start
+    reach, second_reach = -math.inf, -math.inf
+    for v in range(start, table.vertex_start[shape + 1]):
+        r = dot(row(table.vertex, v), local)
+        if r > reach:
+            second, second_reach = best, reach
+            best, reach = v, r
+        elif r > second_reach:
+            second, second_reach = v, r
+    put(feature, 0, add(offset, apply(matrix, scaled(row(table.vertex, best), size))))
+    if second_reach < reach - PATCH_TOLERANCE * table.radius[shape]:
+        return 1, False
+    put(feature, 1, add(offset, apply(matrix, scaled(row(table.vertex, second), size))))
+    return 2, False
+
+
+@kernel
+def _clip(polygon, count, side, bound, clipped):
+    """The part of a polygon (or segment) where side . x <= bound (Sutherland and Hodgman, CACM 17 (1974) 32-42)."""
+    kept = 0
+    for k in range(count):
+        p, q = row(polygon, k), row(polygon, (k + 1) % count)
+        over_p, over_q = dot(side, p) - bound, dot(side, q) - bound
+        if over_p <= 0.0:
+            put(clipped, kept, p)
+            kept += 1
+        # A segment is not a closed loop: its way back would repeat the crossing.
+        if over_p * over_q < 0.0 and (count > 2 or k == 0):
+            put(clipped, kept, along(p, sub(q, p), over_p / (over_p - over_q)))
+            kept += 1
+    return kept
+
+
+@kernel
+def _clip_to_face(face, corners, normal, incident, count, spare):
+    """Clip ``incident`` in place to the prism over a face whose outward normal is given; returns its corners."""
+    for k in range(corners):
+        p = row(face, k)
+        edge = sub(row(face, (k + 1) % corners), p)
+        side = cross(edge, normal)
+        count = _clip(incident, count, side, dot(side, p) + _ON_EDGE * dot(edge, edge), spare)
+        for m in range(count):
+            put(incident, m, row(spare, m))
+    return count
+
+
+@kernel
+def _shared_by_edges(edge_a, edge_b, points):
+    """Points that two edges facing each other share: a segment's two ends if parallel, else their crossing."""
+    a, b = row(edge_a, 0), row(edge_b, 0)
+    u, v = sub(row(edge_a, 1), a), sub(row(edge_b, 1), b)
+    length_u, length_v = norm(u), norm(v)
+    n = cross(u, v)
+    if norm(n) > PARALLEL_TOLERANCE * length_u * length_v:
+        t = dot(cross(sub(b, a), v), n) / dot(n, n)
+        put(points, 0, along(a, u, min(max(t, 0.0), 1.0)))
+        return 1
+    t0, t1 = dot(sub(b, a), u) / length_u**2, dot(sub(row(edge_b, 1), a), u) / length_u**2
+    start, end = max(min(t0, t1), 0.0), min(max(t0, t1), 1.0)
+    put(points, 0, along(a, u, start))
+    if end <= start:
+        return 1
+    put(points, 1, along(a, u, end))
+    return 2
+
+
+@kernel
+def hull_patch(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset, normal, separation, middle, points):
+    """Write the contact points of two hulls, half way between them, relative to a's centroid; returns how many.
+
+    ``normal`` points from a to b. ``middle`` stands in where features that are parallel only within the tolerance
+    share no point. ``points`` is (MAX_MANIFOLD, 3).
+    """
+    of_a, of_b = np.empty((_MAX_CORNERS, 3)), np.empty((_MAX_CORNERS, 3))
+    spare = np.empty((_MAX_CORNERS, 3))
+    back = scaled(normal, -1.0)
+    count_a, face_a = _facing_feature(table, shape_a, size_a, matrix_a, (0.0, 0.0, 0.0), normal, of_a)
+    count_b, face_b = _facing_feature(table, shape_b, size_b, matrix_b, offset, back, of_b)
+    patch, shift = of_a, 0.5 * separation
+    if count_a == 1:
+        count = 1
+    elif count_b == 1:
+        patch, shift, count = of_b, -0.5 * separation, 1
+    elif face_a:
+        patch, shift = of_b, -0.5 * separation
+        count = _clip_to_face(of_a, count_a, normal, of_b, count_b, spare)
+    elif face_b:
+        count = _clip_to_face(of_b, count_b, back, of_a, count_a, spare)
+    else:
+        patch = spare
+        count = _shared_by_edges(of_a, of_b, spare)
+    if count == 0:
+        put(points, 0, middle)
+        return 1
+    kept = min(count, MAX_MANIFOLD)
+    for k in range(kept):
+        put(points, k, along(row(patch, k * count // kept), normal, shift))
+    return kept

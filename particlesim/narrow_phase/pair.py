@@ -1,0 +1,51 @@
+"""The exact test of any two particles: dispatch by geometry kind."""
+
+from particlesim.constants import SPHERE
+from particlesim.jit import kernel
+from particlesim.narrow_phase.hull_hull import hull_hull, hulls_overlap
+from particlesim.narrow_phase.sphere_hull import hull_sphere
+from particlesim.narrow_phase.sphere_sphere import sphere_sphere
+from particlesim.vec import add, norm, put, row, scaled
+
+
+@kernel
+def nearest_image(offset, period):
+    """An offset between two particles, by the shortest way round each periodic axis."""
+    x, y, z = offset
+    if period[0] > 0.0:
+        x -= period[0] * round(x / period[0])
+    if period[1] > 0.0:
+        y -= period[1] * round(y / period[1])
+    if period[2] > 0.0:
+        z -= period[2] * round(z / period[2])
+    return x, y, z
+
+
+@kernel
+def pair_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
+    """Separation (negative: overlap), unit normal from a to b, and number of contact points written.
+
+    ``turn`` are orientations, ``offset`` is b's centroid from a's; points are relative to a's centroid, half way
+    between the two surfaces.
+    """
+    if table.kind[shape_a] == SPHERE:
+        if table.kind[shape_b] == SPHERE:
+            return sphere_sphere(size_a, size_b, offset, points)
+        separation, normal, count = hull_sphere(table, shape_b, size_b, turn_b, size_a, scaled(offset, -1.0), points)
+        put(points, 0, add(offset, row(points, 0)))
+        return separation, scaled(normal, -1.0), count
+    if table.kind[shape_b] == SPHERE:
+        return hull_sphere(table, shape_a, size_a, turn_a, size_b, offset, points)
+    return hull_hull(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points)
+
+
+@kernel
+def pair_overlaps(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
+    """Whether two particles touch or overlap; cheaper than the contact for most that do not."""
+    reach = table.radius[shape_a] * size_a + table.radius[shape_b] * size_b
+    if norm(offset) > reach:
+        return False
+    if table.kind[shape_a] == SPHERE or table.kind[shape_b] == SPHERE:
+        separation, _, _ = pair_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points)
+        return separation <= 0.0
+    return hulls_overlap(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset)

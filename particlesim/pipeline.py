@@ -1,0 +1,134 @@
+"""From a scene to a trajectory, and from either to a movie."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from particlesim.render import Renderer, write_image, write_movie
+from particlesim.render.cells import octree_cells
+from particlesim.scene import Scene
+from particlesim.simulation import Simulation
+from particlesim.summary import Summary
+from particlesim.trajectory import Frame, Header, Trajectory, TrajectoryWriter
+
+T = TypeVar("T")
+
+# Called with what is going on, how many frames are done, and how many there will be.
+Progress = Callable[[str, int, int], None]
+
+
+def simulate(
+    scene: Scene, path: str | Path, *, progress: Progress | None = None, threads: int | None = None
+) -> Summary:
+    """Simulate ``scene`` and write its trajectory to ``path`` (GSD). Needs neither OpenGL nor ffmpeg.
+
+    SceneError if the scene cannot be built, SimulationError if it runs away, OSError if the file cannot be written.
+    """
+    simulation = _start(scene, threads, progress)
+    summary = _summary(scene, simulation.header)
+    watch = _Stopwatch(summary)
+    with TrajectoryWriter(path, simulation.header) as writer:
+        for frame in watch.timed("simulating", _frames(simulation)):
+            writer.append(frame)
+            summary.add(frame)
+            _tell(progress, "simulating", summary.frames, scene.frames)
+    return summary
+
+
+def render(
+    source: Scene | Trajectory | str | Path,
+    path: str | Path,
+    *,
+    progress: Progress | None = None,
+    threads: int | None = None,
+) -> Summary:
+    """Make a movie (MP4) of a scene, simulating it, or of a trajectory, as it was; and a poster (PNG) beside it.
+
+    Errors as for ``simulate``; RenderError if this machine cannot draw or encode.
+    """
+    with ExitStack() as stack:
+        if isinstance(source, str | Path):
+            source = stack.enter_context(Trajectory(source))
+        if isinstance(source, Trajectory):
+            scene, header, total = _scene_of(source), source.header, len(source)
+            frames: Iterable[Frame] = source
+        else:
+            simulation = _start(source, threads, progress)
+            scene, header, total = source, simulation.header, source.frames
+            frames = _frames(simulation)
+        summary = _summary(scene, header)
+        watch = _Stopwatch(summary)
+        phase = "reading" if isinstance(source, Trajectory) else "simulating"
+        renderer = stack.enter_context(Renderer(scene, header))
+        poster: list[np.ndarray] = []
+
+        def images() -> Iterator[np.ndarray]:
+            for frame in watch.timed(phase, frames):
+                image = watch.call("drawing", lambda frame=frame: _draw(renderer, scene, header, frame))
+                # A third of the way in, things have begun to happen.
+                if summary.frames == total // 3:
+                    poster.append(image)
+                summary.add(frame)
+                yield image
+                _tell(progress, "rendering", summary.frames, total)
+
+        times = write_movie(path, images(), scene.movie.fps, scene.movie.resolution)
+        summary.seconds["encoding"] = times.encoding
+        write_image(Path(path).with_suffix(".png"), poster[0])
+    return summary
+
+
+def _start(scene: Scene, threads: int | None, progress: Progress | None) -> Simulation:
+    _tell(progress, "preparing", 0, scene.frames)
+    return Simulation(scene, threads=threads)
+
+
+def _frames(simulation: Simulation) -> Iterator[Frame]:
+    """The frames of a scene: at time zero and at every tick of its movie."""
+    yield simulation.frame()
+    for k in range(1, simulation.scene.frames):
+        simulation.run_until(k / simulation.scene.movie.fps)
+        yield simulation.frame()
+
+
+def _scene_of(trajectory: Trajectory) -> Scene:
+    return Scene.model_validate_json(trajectory.header.scene_json)
+
+
+def _draw(renderer: Renderer, scene: Scene, header: Header, frame: Frame) -> np.ndarray:
+    return renderer.draw(frame, octree_cells(scene, header, frame) if scene.show.cells else None)
+
+
+def _summary(scene: Scene, header: Header) -> Summary:
+    return Summary(float(header.mass.sum()), scene.world.gravity)
+
+
+def _tell(progress: Progress | None, phase: str, done: int, total: int) -> None:
+    if progress is not None:
+        progress(phase, done, total)
+
+
+class _Stopwatch:
+    """Adds up the seconds spent in each part of the work, in ``summary.seconds``."""
+
+    def __init__(self, summary: Summary) -> None:
+        self._seconds = summary.seconds
+
+    def call(self, name: str, work: Callable[[], T]) -> T:
+        """Do something and count how long it took."""
+        start = time.perf_counter()
+        result = work()
+        self._seconds[name] = self._seconds.get(name, 0.0) + time.perf_counter() - start
+        return result
+
+    def timed(self, name: str, frames: Iterable[Frame]) -> Iterator[Frame]:
+        """Pass frames on and count how long each was in coming."""
+        source = iter(frames)
+        while (frame := self.call(name, lambda: next(source, None))) is not None:
+            yield frame

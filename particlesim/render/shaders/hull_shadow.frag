@@ -1,0 +1,3 @@
+#include "common.glsl"
+
+void main() {}

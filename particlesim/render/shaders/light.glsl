@@ -1,0 +1,30 @@
+uniform sampler2DShadow shadow_map;
+
+// The colours of the light, linear. Sky and ground make the light that comes from everywhere.
+const vec3 KEY = vec3(0.86, 0.83, 0.78);
+const vec3 SKY = vec3(0.44, 0.47, 0.52);
+const vec3 GROUND = vec3(0.21, 0.20, 0.19);
+
+// Fraction of the key light that reaches a place: two bilinear looks a little apart. Outside the map all is lit.
+float lit(vec3 place) {
+    // Before its surface by a little, or rounding would cast shadows.
+    vec3 at = (shadow_from_eye * vec4(place, 1.0)).xyz - vec3(0.0, 0.0, 6e-4);
+    vec3 aside = vec3(0.6, -0.6, 0.0) * light.w;
+    return 0.5 * (texture(shadow_map, at + aside) + texture(shadow_map, at - aside));
+}
+
+// What a matt surface sends to the eye of the light from everywhere: less where it turns away, which shows its form.
+vec3 ambient(vec3 colour, vec3 normal, float towards_eye) {
+    return colour * mix(GROUND, SKY, 0.5 + 0.5 * normal.z) * (0.55 + 0.45 * max(towards_eye, 0.0));
+}
+
+// The same of the key light.
+vec3 direct(vec3 colour, vec3 normal) {
+    return colour * KEY * max(dot(normal, light.xyz), 0.0);
+}
+
+// From linear light to the picture. The square root stands for the curve of sRGB at a tenth of its cost; colours
+// come in by the square, so that a colour in full light is the one that was asked for.
+vec3 encode(vec3 light) {
+    return sqrt(light);
+}

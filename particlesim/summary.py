@@ -1,0 +1,72 @@
+"""What a run amounted to: the ledger over all its frames in a few numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from particlesim.trajectory import Frame
+
+
+class Summary:
+    """Gathers frames as they pass: ``add`` each, then read the attributes.
+
+    Energies are compared with the largest kinetic energy seen, so that a start from rest counts as well.
+    """
+
+    def __init__(self, total_mass: float, gravity: Any) -> None:
+        self._mass, self._gravity = total_mass, np.asarray(gravity, dtype=np.float64)
+        self._first: Frame | None = None
+        self._last: Frame | None = None
+        self._largest_kinetic = self._largest_change = 0.0
+        self.frames = 0
+        self.largest_overlap = 0.0
+        self.seconds: dict[str, float] = {}
+
+    def add(self, frame: Frame) -> None:
+        """Take a frame into account."""
+        self._first = self._first or frame
+        self._last = frame
+        self.frames += 1
+        self.largest_overlap = max(self.largest_overlap, frame.ledger["largest_overlap"])
+        kinetic = frame.ledger["kinetic_translational"] + frame.ledger["kinetic_rotational"]
+        self._largest_kinetic = max(self._largest_kinetic, kinetic)
+        self._largest_change = max(self._largest_change, abs(_energy(frame) - _energy(self._first)))
+
+    @property
+    def simulated_seconds(self) -> float:
+        """Time between the first frame and the last [s]."""
+        return self._last.time - self._first.time if self._first and self._last else 0.0
+
+    @property
+    def impacts(self) -> int:
+        """Impacts up to the last frame."""
+        return int(self._last.ledger["impacts"]) if self._last else 0
+
+    @property
+    def unresolved(self) -> int:
+        """Steps that ended while something still approached."""
+        return int(self._last.ledger["unresolved"]) if self._last else 0
+
+    @property
+    def worst_energy_drift(self) -> float:
+        """Largest change of the total energy since the first frame, over the largest kinetic energy."""
+        return self._largest_change / self._largest_kinetic if self._largest_kinetic else 0.0
+
+    @property
+    def momentum_error(self) -> float:
+        """Change of momentum that neither walls nor gravity account for, over the momentum of the fastest motion."""
+        if not (self._first and self._last and self._largest_kinetic):
+            return 0.0
+        first, last = self._first.ledger, self._last.ledger
+        given = last["wall_impulse"] - first["wall_impulse"]
+        to_walls = np.array([given[1] - given[0], given[3] - given[2], given[5] - given[4]])
+        fallen = self._mass * self._gravity * (self._last.time - self._first.time)
+        error = last["momentum"] - first["momentum"] + to_walls - fallen
+        return float(np.linalg.norm(error) / np.sqrt(2.0 * self._mass * self._largest_kinetic))
+
+
+def _energy(frame: Frame) -> float:
+    ledger = frame.ledger
+    return float(ledger["kinetic_translational"] + ledger["kinetic_rotational"] + ledger["potential"])

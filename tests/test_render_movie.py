@@ -1,0 +1,100 @@
+"""Movies and images as files: what is in them, and that none is left half written."""
+
+import re
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from PIL import Image
+
+from particlesim.render import RenderError, movie, write_image, write_movie
+
+SIZE = (130, 98)  # even, but no multiples of the 16 pixels that encoders like
+
+
+def images(count):
+    for number in range(count):
+        image = np.full((SIZE[1], SIZE[0], 3), 200, dtype=np.uint8)
+        image[20:60, 2 * number : 2 * number + 40] = (180, 40, 30)
+        yield image
+
+
+def decoded(path):
+    reader = imageio_ffmpeg.read_frames(str(path))
+    meta = next(reader)
+    width, height = meta["size"]
+    return meta, [np.frombuffer(frame, np.uint8).reshape(height, width, 3) for frame in reader]
+
+
+def test_movie_has_the_frames_size_rate_and_colours_that_went_in(tmp_path):
+    path = tmp_path / "a.mp4"
+    times = write_movie(path, images(25), 25.0, SIZE)
+    meta, frames = decoded(path)
+    assert meta["size"] == SIZE and meta["codec"] == "h264" and meta["pix_fmt"].startswith("yuv420p")
+    assert "bt709" in meta["pix_fmt"] and meta["fps"] == 25.0 and len(frames) == 25
+    for got, sent in zip(frames, images(25), strict=True):
+        assert np.abs(got.astype(int) - sent).mean() < 3.0
+    assert np.abs(frames[0][30, 20].astype(int) - (180, 40, 30)).max() < 12
+    assert times.frames == 25 and times.drawing >= 0.0 and times.encoding > 0.0
+    assert [p.name for p in tmp_path.iterdir()] == ["a.mp4"]
+    # Faststart: the index stands before the data.
+    data = path.read_bytes()
+    assert 0 < data.find(b"moov") < data.find(b"mdat")
+
+
+def test_same_images_give_the_same_bytes(tmp_path):
+    for name in ("a.mp4", "b.mp4"):
+        write_movie(tmp_path / name, images(12), 29.97, SIZE)
+    assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
+    # Nor do they tell the versions of the encoder.
+    assert not re.search(rb"x264 - core|Lav[cf][0-9]", (tmp_path / "a.mp4").read_bytes())
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, ZeroDivisionError])
+def test_nothing_is_left_when_drawing_stops(tmp_path, stop):
+    path = tmp_path / "a.mp4"
+    path.write_bytes(b"the movie of last time")
+
+    def stopping():
+        yield from images(5)
+        raise stop
+
+    with pytest.raises(stop):
+        write_movie(path, stopping(), 30.0, SIZE)
+    assert path.read_bytes() == b"the movie of last time"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.mp4"]
+
+
+def test_images_of_another_size_or_none_are_refused(tmp_path):
+    with pytest.raises(ValueError, match="shape"):
+        write_movie(tmp_path / "a.mp4", [np.zeros((10, 10, 3), np.uint8)], 30.0, SIZE)
+    with pytest.raises(RenderError, match="no frames"):
+        write_movie(tmp_path / "a.mp4", [], 30.0, SIZE)
+    assert not list(tmp_path.iterdir())
+
+
+def test_failing_ffmpeg_says_why_in_one_line(tmp_path, monkeypatch):
+    fake = tmp_path / "ffmpeg"
+    fake.write_text("#!/bin/sh\necho first >&2\necho no space left on device >&2\nexit 3\n")
+    fake.chmod(0o755)
+    monkeypatch.setattr(movie, "ffmpeg", lambda: str(fake))
+    with pytest.raises(RenderError) as error:
+        write_movie(tmp_path / "a.mp4", images(200), 30.0, SIZE)
+    assert str(error.value) == "ffmpeg failed with exit status 3: no space left on device"
+    assert [p.name for p in tmp_path.iterdir()] == ["ffmpeg"]
+
+
+def test_missing_folder_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match="no folder"):
+        write_movie(tmp_path / "none" / "a.mp4", images(1), 30.0, SIZE)
+    with pytest.raises(FileNotFoundError, match="no folder"):
+        write_image(tmp_path / "none" / "a.png", next(images(1)))
+
+
+def test_image_comes_back_as_it_was(tmp_path):
+    image = next(images(1))
+    write_image(tmp_path / "a.png", image)
+    assert np.array_equal(np.asarray(Image.open(tmp_path / "a.png")), image)
+    with pytest.raises(RenderError, match="unknown"):
+        write_image(tmp_path / "a.nonsense", image)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.png"]
