@@ -24,6 +24,10 @@ from particlesim.narrow_phase.contacts import contact_between, contact_now
 from particlesim.vec import add, along, cross, dot, norm, put, row, row4, scaled, sub
 
 
+# Moments at which two that met before within a step are looked for apart, before they met again.
+_MOMENTS = 8
+
+
 class Tally(NamedTuple):
     """What impacts add up to since the start."""
 
@@ -158,18 +162,38 @@ def _separation_before(table, world, constants, state, i, j, earlier, points):
 
 
 @kernel
+def _moment_apart(table, world, constants, state, i, j, start, tolerance, points):
+    """The first moment, ``start`` seconds ago or later, at which i and j were apart, and their separation then.
+
+    Two that met within this step touch at its start and may meet again, with other corners, before its end: moments
+    in between are looked at as well. If they were apart at none, the start will do when they only touched then;
+    else 0 seconds ago is returned.
+    """
+    at_start = _separation_before(table, world, constants, state, i, j, start, points)
+    if at_start > tolerance:
+        return start, at_start
+    for k in range(_MOMENTS - 1, 0, -1):
+        earlier = start * k / _MOMENTS
+        separation = _separation_before(table, world, constants, state, i, j, earlier, points)
+        if separation > tolerance:
+            return earlier, separation
+    return (start if at_start >= -tolerance else 0.0), at_start
+
+
+@kernel
 def _time_since_impact(table, world, constants, state, clock, i, j, points):
     """How long ago i and j met [s], by regula falsi on the exact separation; 0 if they overlapped all along.
 
     ``clock`` (n,) is how long each has been on its present free path. The Illinois variant halves the weight of an
     end that is kept twice in a row and so converges faster than linearly (M. Dowell, P. Jarratt, BIT 11 (1971) 168).
     """
-    late, early = 0.0, clock[i] if j < 0 else min(clock[i], clock[j])
-    inside = _separation_before(table, world, constants, state, i, j, late, points)
-    outside = _separation_before(table, world, constants, state, i, j, early, points)
-    if outside < 0.0 or inside >= 0.0:
-        return 0.0
     tolerance = IMPACT_TOLERANCE * (constants.size[i] + (constants.size[j] if j >= 0 else 0.0))
+    start = clock[i] if j < 0 else min(clock[i], clock[j])
+    late = 0.0
+    inside = _separation_before(table, world, constants, state, i, j, late, points)
+    early, outside = _moment_apart(table, world, constants, state, i, j, start, tolerance, points)
+    if early == 0.0 or inside >= 0.0:
+        return 0.0
     gap = outside
     side = 0
     while gap > tolerance:

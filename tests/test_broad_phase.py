@@ -244,12 +244,12 @@ def test_large_scenes_on_one_thread_and_two(threads, reference, method, name):
 
 
 def test_naive_tests_each_pair_once_on_any_number_of_threads(threads):
-    lower, upper, period = large_scene("uniform", 9000)
+    lower, upper, period = large_scene("uniform", 17000)
     results = []
     for number in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
         numba.set_num_threads(number)
         pairs, tested = METHODS["naive"](lower, upper, period)
-        assert tested == 9000 * 8999 // 2
+        assert tested == 17000 * 16999 // 2
         results.append(pairs)
     np.testing.assert_array_equal(*results)
 

@@ -18,7 +18,7 @@ import numba
 Result = TypeVar("Result")
 
 # Fewer objects than this are done by the calling thread: starting a thread costs about 0.1 ms.
-ALONE = 8192
+ALONE = 16384
 
 
 class Crew:

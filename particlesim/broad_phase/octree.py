@@ -27,8 +27,9 @@ from particlesim.broad_phase.survey import Survey, survey
 from particlesim.broad_phase.tree import CHILD, CHILDREN, START, STOP, build, fit
 from particlesim.jit import kernel
 
-# Subtrees that a search is shared out by.
-SUBTREES = 512
+# A search of many boxes is shared out by subtrees that hold at most this part of all: up to eight times as many, each
+# tested against each.
+SUBTREES = 64
 
 # Pairs of nodes that wait.  Splitting a node against itself adds at most 36 pairs, once 36 more for the classes,
 # splitting one of two adds 8, and the depth is at most LEVELS + 1 for each: 21 * 36 + 42 * 8 at most.

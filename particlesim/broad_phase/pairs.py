@@ -23,7 +23,7 @@ PORTION = 32
 LANES = 8
 
 # Blocks a search is cut into for each thread: the work in a block is uneven.
-BLOCKS_PER_THREAD = 32
+BLOCKS_PER_THREAD = 16
 
 # Rounding of coordinates and of their differences, relative to the largest coordinate: 32 units in the last place.
 # Wherever a method sorts boxes by rounded numbers, it widens its reach by this.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from particlesim.broad_phase import octree_leaves
 from particlesim.render import geometry
 from particlesim.render.colour import map_colours
 from particlesim.scene import Scene
@@ -26,6 +25,8 @@ def cell_lines(lower: np.ndarray, upper: np.ndarray, depth: np.ndarray, width: f
 
 def octree_cells(scene: Scene, header: Header, frame: Frame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Lower and upper corners (k, 3) [m] and depths (k,) of the octree's leaves over the particles of a frame."""
+    from particlesim.broad_phase import octree_leaves  # noqa: PLC0415  (numba is slow to import)
+
     chosen = scene.solver.broad_phase
     octree = chosen if isinstance(chosen, Octree) else Octree(kind="octree")
     upper = 0.5 * np.asarray(scene.world.size)

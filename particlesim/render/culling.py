@@ -9,7 +9,7 @@ import numpy as np
 from particlesim.jit import kernel
 
 # Edge of the squares in which coverage is noted [pixels]: smaller ones find more, larger ones cost less.
-_SQUARE = 2
+_SQUARE = 1
 
 
 def in_sight(seen: np.ndarray, inner: np.ndarray, outer: np.ndarray, slope: float, size: tuple[int, int]) -> np.ndarray:
@@ -53,8 +53,8 @@ def _any_open(squares, left, right, low, high, near):
     rows, columns = squares.shape
     if right < 0.0 or high < 0.0 or left > columns or low > rows:
         return False
-    for row in range(max(0, int(math.floor(low))), min(rows - 1, int(math.floor(high))) + 1):
-        for column in range(max(0, int(math.floor(left))), min(columns - 1, int(math.floor(right))) + 1):
+    for row in range(max(0, math.floor(low)), min(rows - 1, math.floor(high)) + 1):
+        for column in range(max(0, math.floor(left)), min(columns - 1, math.floor(right)) + 1):
             if squares[row, column] >= near:
                 return True
     return False
@@ -64,11 +64,11 @@ def _any_open(squares, left, right, low, high, near):
 def _cover(squares, x, y, radius, away):
     """Note that the squares wholly inside a circle hide what is farther than ``away``."""
     rows, columns = squares.shape
-    for row in range(max(0, int(math.ceil(y - radius))), min(rows, int(math.floor(y + radius)))):
+    for row in range(max(0, math.ceil(y - radius)), min(rows, math.floor(y + radius))):
         # The corners farthest from the middle decide.
         dy = max(abs(row - y), abs(row + 1 - y))
         if dy < radius:
             half = math.sqrt(radius * radius - dy * dy)
-            first, last = max(0, int(math.ceil(x - half))), min(columns, int(math.floor(x + half)))
+            first, last = max(0, math.ceil(x - half)), min(columns, math.floor(x + half))
             for column in range(first, last):
                 squares[row, column] = min(squares[row, column], away)
