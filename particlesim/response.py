@@ -24,8 +24,8 @@ from particlesim.narrow_phase.contacts import contact_between, contact_now
 from particlesim.vec import add, along, cross, dot, norm, put, row, row4, scaled, sub
 
 
-# Moments at which two that met before within a step are looked for apart, before they met again.
-_MOMENTS = 8
+# Two that meet twice within a step are looked for apart in between down to this power of a half of the step.
+_HALVINGS = 24
 
 
 class Tally(NamedTuple):
@@ -165,15 +165,15 @@ def _separation_before(table, world, constants, state, i, j, earlier, points):
 def _moment_apart(table, world, constants, state, i, j, start, tolerance, points):
     """The first moment, ``start`` seconds ago or later, at which i and j were apart, and their separation then.
 
-    Two that met within this step touch at its start and may meet again, with other corners, before its end: moments
-    in between are looked at as well. If they were apart at none, the start will do when they only touched then;
-    else 0 seconds ago is returned.
+    Two that met within this step touch at its start and may meet again with other corners, sooner or later: moments
+    at halving distances from the start are looked at as well. If they were apart at none, the start will do when
+    they only touched then; else 0 seconds ago is returned.
     """
     at_start = _separation_before(table, world, constants, state, i, j, start, points)
     if at_start > tolerance:
         return start, at_start
-    for k in range(_MOMENTS - 1, 0, -1):
-        earlier = start * k / _MOMENTS
+    for k in range(_HALVINGS, 0, -1):
+        earlier = start - start * 0.5**k
         separation = _separation_before(table, world, constants, state, i, j, earlier, points)
         if separation > tolerance:
             return earlier, separation

@@ -49,14 +49,13 @@ class Kind:
     mode: int = gl.GL_TRIANGLES
     shadow: bool = False  # casts one
     cull: bool = False  # only faces towards the camera are drawn, only those away from the light cast a shadow
-    lit: bool = True  # looks into the shadow map
     blend: bool = False  # lets through what is behind it, and hides nothing
 
 
 SPHERE = Kind("sphere", (3,), (4, 3), gl.GL_TRIANGLE_STRIP, shadow=True)
 HULL = Kind("hull", (3, 3, 4), (4, 4, 3), shadow=True, cull=True)
 FLOOR = Kind("floor", (3,), (), gl.GL_TRIANGLE_STRIP)
-LINE = Kind("line", (3,), (4, 3, 4), gl.GL_TRIANGLE_STRIP, lit=False, blend=True)
+LINE = Kind("line", (3,), (4, 3, 4), gl.GL_TRIANGLE_STRIP, blend=True)
 
 
 class Layer(pyrender.Primitive):
