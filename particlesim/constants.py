@@ -44,6 +44,3 @@ APPROACH_TOLERANCE = 1e-12
 # An impact is placed where the separation is between 0 and this fraction of the particles' sizes: an order above the
 # rounding of positions in a world a thousand sizes wide, so that the particles are apart when they go on.
 IMPACT_TOLERANCE = 1e-12
-
-# Loops over fewer items than this run on one thread: waking another takes longer [about 20 us].
-SERIAL_BELOW = 2048

@@ -23,7 +23,7 @@ def diagnose() -> list[Finding]:
     """Look at everything a movie needs."""
     findings = [
         Finding("python", True, platform.python_version()),
-        Finding("numba", True, f"{numba.__version__}, {numba.config.NUMBA_NUM_THREADS} threads"),
+        Finding("numba", True, f"{numba.__version__}, {numba.get_num_threads()} threads"),
         Finding("kernel cache", True, CACHE_FOLDER),
     ]
     for what, look in (("OpenGL", describe), ("ffmpeg", describe_ffmpeg)):

@@ -12,7 +12,7 @@ from particlesim.constants import MAX_MANIFOLD
 from particlesim.jit import kernel
 from particlesim.narrow_phase.pair import nearest_image, pair_overlaps
 from particlesim.state import Constants, ShapeTable, World
-from particlesim.vec import put, row, row4, sub
+from particlesim.vec import norm, put, row, row4, sub
 
 
 class Placed(NamedTuple):
@@ -51,8 +51,9 @@ def empty_space(constants: Constants, world: World, total: int) -> Placed:
 
 @kernel
 def _write_extents(table, shape, size, orientation, below, above):
+    kind, vertices, start = table.kind, table.vertex, table.vertex_start
     for i in range(len(shape)):
-        lower, upper = particle_extent(table, shape[i], size[i], row4(orientation, i))
+        lower, upper = particle_extent(kind, vertices, start, shape[i], size[i], row4(orientation, i))
         put(below, i, lower)
         put(above, i, upper)
 
@@ -68,8 +69,8 @@ def _bucket(level, x, y, z, buckets):
 def _cell_range(world, cells, axis, coordinate, reach):
     """First and last cell along an axis within ``reach`` of a coordinate; each cell of a periodic axis once."""
     per_metre = cells / (world.upper[axis] - world.lower[axis])
-    first = int(math.floor((coordinate - reach - world.lower[axis]) * per_metre))
-    last = int(math.floor((coordinate + reach - world.lower[axis]) * per_metre))
+    first = math.floor((coordinate - reach - world.lower[axis]) * per_metre)
+    last = math.floor((coordinate + reach - world.lower[axis]) * per_metre)
     if world.period[axis] > 0.0 and last - first >= cells:
         return 0, cells - 1
     return first, last
@@ -104,7 +105,8 @@ def _meets_any(table, world, constants, placed, i, points):
                     j = placed.head[_bucket_of(world, placed, level, cx, cy, cz)]
                     while j >= 0:
                         offset = nearest_image(sub(row(placed.position, j), (x, y, z)), world.period)
-                        if pair_overlaps(
+                        near = norm(offset) <= constants.radius[i] + constants.radius[j]
+                        if near and pair_overlaps(
                             table,
                             constants.shape[i],
                             constants.size[i],
@@ -135,7 +137,7 @@ def put_in_place(world, placed, i):
 
 @kernel
 def try_in_place(table, world, constants, placed, who, proposals):
-    """Put each particle of ``who`` (m,) where ``proposals`` (m, 3) says if it meets nobody there; returns whether, (m,)."""
+    """Put each particle of ``who`` (m,) where ``proposals`` (m, 3) says if it meets nobody there: whether, (m,)."""
     points = np.empty((MAX_MANIFOLD, 3))
     fits = np.zeros(len(who), dtype=np.bool_)
     for k in range(len(who)):

@@ -23,7 +23,7 @@ def _source_digest() -> str:
     digest = hashlib.sha256()
     for path in sorted(_PACKAGE.rglob("*.py")):
         source = path.read_bytes()
-        if b"kernel" in source or path.name == "constants.py":
+        if b"@kernel" in source or path.name in ("constants.py", "jit.py"):
             digest.update(source)
     return digest.hexdigest()[:16]
 
@@ -45,24 +45,20 @@ def _cache_folder() -> str:
 CACHE_FOLDER = _cache_folder()
 
 
-# What numba would otherwise turn into parallel loops by itself.
-_AUTOMATIC = ("comprehension", "reduction", "inplace_binop", "setitem", "numpy", "stencil")
-
-
-def kernel(function: Callable[..., Any] | None = None, *, parallel: bool = False) -> Any:
+def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False) -> Any:
     """Compile ``function`` for the machine: cached on disk, without the GIL, IEEE arithmetic (no fastmath).
 
-    ``parallel=True`` allows ``numba.prange``; such a kernel writes only to the slot of its own index, so its
-    result does not depend on the number of threads.
+    ``inline=True`` writes it into its callers.  It is for what runs once an item and takes the structs of arrays:
+    handing these over counts references to some thirty arrays, which takes longer than moving a particle.
     """
     if function is None:
-        return lambda wrapped: kernel(wrapped, parallel=parallel)
-    # Only the loops written with prange: small array expressions are not worth waking a thread for.
-    options: Any = dict.fromkeys(_AUTOMATIC, False) | {"prange": True} if parallel else False
+        return lambda wrapped: kernel(wrapped, inline=inline)
     # The place of a function's cache is settled when it is decorated; other users of numba keep theirs.
-    elsewhere = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = CACHE_FOLDER
+    config: Any = numba.config
+    elsewhere = config.CACHE_DIR
+    config.CACHE_DIR = CACHE_FOLDER
     try:
-        return numba.njit(cache=True, nogil=True, parallel=options, error_model="numpy")(function)
+        options: dict[str, Any] = {"inline": "always" if inline else "never", "error_model": "numpy"}
+        return numba.njit(cache=True, nogil=True, **options)(function)
     finally:
-        numba.config.CACHE_DIR = elsewhere
+        config.CACHE_DIR = elsewhere

@@ -7,12 +7,12 @@ follows from it and the orientation.
 import math
 
 import numpy as np
-from numba import prange
 
-from particlesim.bounds import write_box
-from particlesim.constants import PERIODIC, SERIAL_BELOW, STEP_FRACTION
+from particlesim.bounds import particle_extent
+from particlesim.constants import STEP_FRACTION
 from particlesim.jit import kernel
 from particlesim.vec import (
+    add,
     along,
     cross,
     dot,
@@ -179,48 +179,71 @@ def free_rotation(turn, momentum, moments, time):
 
 
 @kernel
-def free_path(constants, state, world, i, time):
-    """Position, orientation and velocity of particle ``i`` after ``time`` [s], of either sign."""
-    gravity = (world.gravity[0], world.gravity[1], world.gravity[2])
-    velocity = row(state.velocity, i)
-    position = along(along(row(state.position, i), velocity, time), gravity, 0.5 * time * time)
-    turn = free_rotation(row4(state.orientation, i), row(state.angular_momentum, i), row(constants.inertia, i), time)
-    return position, turn, along(velocity, gravity, time)
+def free_path(position, turn, velocity, momentum, moments, gravity, time):
+    """Position, orientation and velocity of a particle after ``time`` [s] of either sign."""
+    position = along(along(position, velocity, time), gravity, 0.5 * time * time)
+    return position, free_rotation(turn, momentum, moments, time), along(velocity, gravity, time)
+
+
+@kernel
+def path_of(constants, state, world, i, time):
+    """Position, orientation and velocity of particle ``i`` after ``time`` [s] of either sign."""
+    return free_path(
+        row(state.position, i),
+        row4(state.orientation, i),
+        row(state.velocity, i),
+        row(state.angular_momentum, i),
+        row(constants.inertia, i),
+        (world.gravity[0], world.gravity[1], world.gravity[2]),
+        time,
+    )
 
 
 @kernel
 def move(constants, state, world, i, time):
     """Move particle ``i`` along its free path."""
-    position, turn, velocity = free_path(constants, state, world, i, time)
+    position, turn, velocity = path_of(constants, state, world, i, time)
     put(state.position, i, position)
     put4(state.orientation, i, turn)
     put(state.velocity, i, velocity)
 
 
 @kernel
-def _advance_one(table, constants, state, world, i, time, lower, upper):
-    """Move particle ``i``, bring it back into a periodic world, and write its box, wide enough for a rebound."""
-    move(constants, state, world, i, time)
-    for axis in range(3):
-        if world.boundary[axis] == PERIODIC:
-            turns = math.floor((state.position[i, axis] - world.lower[axis]) / world.period[axis])
-            state.position[i, axis] -= turns * world.period[axis]
-            state.image[i, axis] += int(turns)
-    margin = STEP_FRACTION * constants.inradius[i]
-    size, shape = constants.size[i], constants.shape[i]
-    write_box(table, shape, size, state.position, state.orientation, i, margin, lower, upper)
+def _turns_round(position, lower, period):
+    """How often a coordinate has gone round a periodic axis; 0 on any other."""
+    return math.floor((position - lower) / period) if period > 0.0 else 0
 
 
-@kernel(parallel=True)
-def advance(table, constants, state, world, time, lower, upper):
-    """Move all particles along their free paths for ``time`` [s] and write their boxes."""
-    n = len(constants.mass)
-    if n < SERIAL_BELOW:
-        for i in range(n):
-            _advance_one(table, constants, state, world, i, time, lower, upper)
-    else:
-        for i in prange(n):
-            _advance_one(table, constants, state, world, i, time, lower, upper)
+@kernel
+def advance(table, constants, state, world, time, lower, upper, first, last):
+    """Move particles ``first .. last`` along their free paths for ``time`` [s] and write their boxes.
+
+    Particles that leave a periodic world come back on the other side. The boxes are wide enough for a rebound.
+    """
+    # Taken out of their structs once: each access counts references, which costs more than the arithmetic.
+    position, orientation, velocity = state.position, state.orientation, state.velocity
+    momentum, image, inertia = state.angular_momentum, state.image, constants.inertia
+    shape, size, inradius = constants.shape, constants.size, constants.inradius
+    kind, vertices, start = table.kind, table.vertex, table.vertex_start
+    gravity, corner, period = row(world.gravity.reshape(1, 3), 0), world.lower, world.period
+    for i in range(first, last):
+        x, q, v = free_path(
+            row(position, i), row4(orientation, i), row(velocity, i), row(momentum, i), row(inertia, i), gravity, time
+        )
+        for axis in range(3):
+            image[i, axis] += _turns_round(x[axis], corner[axis], period[axis])
+        x = (
+            x[0] - period[0] * _turns_round(x[0], corner[0], period[0]),
+            x[1] - period[1] * _turns_round(x[1], corner[1], period[1]),
+            x[2] - period[2] * _turns_round(x[2], corner[2], period[2]),
+        )
+        put(position, i, x)
+        put4(orientation, i, q)
+        put(velocity, i, v)
+        below, above = particle_extent(kind, vertices, start, shape[i], size[i], q)
+        margin = STEP_FRACTION * inradius[i]
+        put(lower, i, add(x, (below[0] - margin, below[1] - margin, below[2] - margin)))
+        put(upper, i, add(x, (above[0] + margin, above[1] + margin, above[2] + margin)))
 
 
 @kernel
@@ -229,11 +252,14 @@ def longest_step(constants, state, world):
 
     The surface moves at most (|v| + |w| R) t + g t^2 / 2; infinite if nothing moves and nothing pulls.
     """
-    g = norm((world.gravity[0], world.gravity[1], world.gravity[2]))
+    velocity, orientation, momentum = state.velocity, state.orientation, state.angular_momentum
+    inertia, radius, inradius = constants.inertia, constants.radius, constants.inradius
+    g = norm(row(world.gravity.reshape(1, 3), 0))
     longest = math.inf
-    for i in range(len(constants.mass)):
-        speed = norm(row(state.velocity, i)) + norm(particle_spin(constants, state, i)) * constants.radius[i]
-        room = STEP_FRACTION * constants.inradius[i]
+    for i in range(len(radius)):
+        spin = spin_of(row4(orientation, i), row(momentum, i), row(inertia, i))
+        speed = norm(row(velocity, i)) + norm(spin) * radius[i]
+        room = STEP_FRACTION * inradius[i]
         denominator = speed + math.sqrt(speed * speed + 2.0 * g * room)
         if denominator > 0.0:
             longest = min(longest, 2.0 * room / denominator)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
@@ -16,8 +15,6 @@ from particlesim.scene import Scene
 from particlesim.simulation import Simulation
 from particlesim.summary import Summary
 from particlesim.trajectory import Frame, Header, Trajectory, TrajectoryWriter
-
-T = TypeVar("T")
 
 # Called with what is going on, how many frames are done, and how many there will be.
 Progress = Callable[[str, int, int], None]
@@ -70,7 +67,9 @@ def render(
 
         def images() -> Iterator[np.ndarray]:
             for frame in watch.timed(phase, frames):
-                image = watch.call("drawing", lambda frame=frame: _draw(renderer, scene, header, frame))
+                with watch.running("drawing"):
+                    cells = octree_cells(scene, header, frame) if scene.show.cells else None
+                    image = renderer.draw(frame, cells)
                 # A third of the way in, things have begun to happen.
                 if summary.frames == total // 3:
                     poster.append(image)
@@ -101,10 +100,6 @@ def _scene_of(trajectory: Trajectory) -> Scene:
     return Scene.model_validate_json(trajectory.header.scene_json)
 
 
-def _draw(renderer: Renderer, scene: Scene, header: Header, frame: Frame) -> np.ndarray:
-    return renderer.draw(frame, octree_cells(scene, header, frame) if scene.show.cells else None)
-
-
 def _summary(scene: Scene, header: Header) -> Summary:
     return Summary(float(header.mass.sum()), scene.world.gravity)
 
@@ -120,15 +115,19 @@ class _Stopwatch:
     def __init__(self, summary: Summary) -> None:
         self._seconds = summary.seconds
 
-    def call(self, name: str, work: Callable[[], T]) -> T:
-        """Do something and count how long it took."""
+    @contextmanager
+    def running(self, name: str) -> Iterator[None]:
+        """Count how long the ``with`` block takes."""
         start = time.perf_counter()
-        result = work()
+        yield
         self._seconds[name] = self._seconds.get(name, 0.0) + time.perf_counter() - start
-        return result
 
     def timed(self, name: str, frames: Iterable[Frame]) -> Iterator[Frame]:
         """Pass frames on and count how long each was in coming."""
         source = iter(frames)
-        while (frame := self.call(name, lambda: next(source, None))) is not None:
+        while True:
+            with self.running(name):
+                frame = next(source, None)
+            if frame is None:
+                return
             yield frame

@@ -19,10 +19,9 @@ from particlesim.constants import (
     RESTING_DROP,
 )
 from particlesim.jit import kernel
-from particlesim.motion import free_path, move, particle_spin, spin_of
+from particlesim.motion import move, particle_spin, path_of, spin_of
 from particlesim.narrow_phase.contacts import contact_between, contact_now
 from particlesim.vec import add, along, cross, dot, norm, put, row, row4, scaled, sub
-
 
 # Two that meet twice within a step are looked for apart in between down to this power of a half of the step.
 _HALVINGS = 24
@@ -155,8 +154,8 @@ def _answer_patch(world, constants, state, i, j, offset, normal, points, count, 
 def _separation_before(table, world, constants, state, i, j, earlier, points):
     """Separation of i and j ``earlier`` seconds before now, along their free paths."""
     other = max(j, 0)
-    position_i, turn_i, _ = free_path(constants, state, world, i, -earlier)
-    position_j, turn_j, _ = free_path(constants, state, world, other, -earlier)
+    position_i, turn_i, _ = path_of(constants, state, world, i, -earlier)
+    position_j, turn_j, _ = path_of(constants, state, world, other, -earlier)
     separation, _, _, _ = contact_between(table, world, constants, i, j, position_i, turn_i, position_j, turn_j, points)
     return separation
 

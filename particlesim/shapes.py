@@ -130,7 +130,7 @@ def mesh(file: str | Path) -> Shape:
     if not path.is_file():
         raise FileNotFoundError(f"no such file: {path}")
     try:
-        loaded = trimesh.load(path, force="mesh", process=False)
+        loaded: Any = trimesh.load(path, force="mesh", process=False)
         points = np.asarray(loaded.vertices, dtype=np.float64)
     except Exception as error:
         raise ValueError(f"{path} cannot be read as a mesh: {error}") from error

@@ -11,6 +11,7 @@ import numpy as np
 from particlesim.broad_phase import METHODS
 from particlesim.build import build
 from particlesim.constants import MAX_ROUNDS
+from particlesim.crew import Crew
 from particlesim.ledger import Ledger, sums
 from particlesim.motion import advance, longest_step, spins
 from particlesim.narrow_phase.contacts import deepest_overlap, touching_pairs, touching_walls
@@ -89,7 +90,12 @@ class Simulation:
 
     def _advance(self, time_step: float) -> None:
         """Move every particle along its free path and find the candidate pairs at its end."""
-        advance(self.table, self.constants, self.state, self.world, time_step, self._lower, self._upper)
+        where = self.table, self.constants, self.state, self.world
+        with Crew(len(self._clock)) as crew:
+            crew.each(
+                lambda _, first, last: advance(*where, time_step, self._lower, self._upper, first, last),
+                len(self._clock),
+            )
         self._pairs, tested = self._find_pairs(self._lower, self._upper, self.world.period, **self._parameters)
         self._pairs_tested += int(tested)
         self._candidate_pairs += len(self._pairs)

@@ -32,7 +32,9 @@ def survey(scene: Scene) -> list[tuple[str, str]]:
         shape = simulation.shapes[int(c.shape[members][0])]
         sizes = c.size[members]
         span = f"{sizes.min():g}" if sizes.min() == sizes.max() else f"{sizes.min():g} to {sizes.max():g}"
-        rows.append((f"  {name}", f"{members.sum():,} x {shape.name}, size {span}, mass {c.mass[members].sum():.4g} kg"))
+        rows.append(
+            (f"  {name}", f"{members.sum():,} x {shape.name}, size {span}, mass {c.mass[members].sum():.4g} kg")
+        )
     width, height = scene.movie.resolution
     pixels = 3 * width * height
     chosen = "given" if scene.solver.time_step != "auto" else "automatic, at the start"

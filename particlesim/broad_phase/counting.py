@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from particlesim.broad_phase.crew import Crew
+from particlesim.crew import Crew
 from particlesim.jit import kernel
 
 # Digits of a radix sort [bits]: counters of one digit stay in the fast cache, a few keys do not clear thousands.

@@ -11,7 +11,6 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.broad_phase.counting import counting_sort
-from particlesim.broad_phase.crew import Crew
 from particlesim.broad_phase.layout import Layout, cells_of_box, fill_cell_keys, lay_out
 from particlesim.broad_phase.pairs import (
     any_wraps,
@@ -22,6 +21,7 @@ from particlesim.broad_phase.pairs import (
     gathered,
 )
 from particlesim.broad_phase.survey import survey
+from particlesim.crew import Crew
 from particlesim.jit import kernel
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from particlesim.broad_phase.crew import Crew
 from particlesim.broad_phase.pairs import any_wraps, append_overlaps, canonical, collect, gathered
+from particlesim.crew import Crew
 from particlesim.jit import kernel
 
 # Boxes that are tested against a whole range before the next is taken: 48 kB, which stay in the fastest cache.

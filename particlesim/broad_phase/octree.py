@@ -12,7 +12,6 @@ import numpy as np
 
 from particlesim.broad_phase.codes import CODE_BITS, LEVELS, fill_codes
 from particlesim.broad_phase.counting import radix_sort
-from particlesim.broad_phase.crew import ALONE, Crew
 from particlesim.broad_phase.pairs import (
     any_wraps,
     append_overlaps,
@@ -25,6 +24,7 @@ from particlesim.broad_phase.pairs import (
 )
 from particlesim.broad_phase.survey import Survey, survey
 from particlesim.broad_phase.tree import CHILD, CHILDREN, START, STOP, build, fit
+from particlesim.crew import ALONE, Crew
 from particlesim.jit import kernel
 
 # A search of many boxes is shared out by subtrees that hold at most this part of all: up to eight times as many, each

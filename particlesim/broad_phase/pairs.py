@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from particlesim.broad_phase.crew import Crew
+from particlesim.crew import Crew
 from particlesim.jit import kernel
 
 # Candidates are taken in portions of this many, the bits of a number; a list of pairs has room for one portion more

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.broad_phase.crew import Crew
 from particlesim.broad_phase.pairs import SLACK
+from particlesim.crew import Crew
 from particlesim.jit import kernel
 
 # The typical place and size are taken from this many boxes, picked by multiples of a prime modulo the number of

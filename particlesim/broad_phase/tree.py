@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.broad_phase.codes import CLASS_SHIFT, LEVELS
-from particlesim.broad_phase.crew import Crew
 from particlesim.broad_phase.survey import wrapped_centre
+from particlesim.crew import Crew
 from particlesim.jit import kernel
 
 # Columns of ``nodes`` (k, 4) int32: the range of boxes, the first child (the others follow it), how many; a leaf

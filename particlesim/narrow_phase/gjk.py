@@ -18,22 +18,25 @@ _GAP = 1e-15
 # Hulls nearer than this fraction of their sizes count as touching here; the separating axis test takes over.
 TOUCHING = 1e-10
 
-# Each step strictly shortens the distance, so this bound is never met in exact arithmetic on hulls of MAX_MESH_VERTICES.
+# Every step shortens the distance, so hulls of MAX_MESH_VERTICES never come near this bound.
 _MAX_STEPS = 256
 
 
 @kernel
-def support(table, shape, size, matrix, direction):
-    """The vertex of a hull farthest along ``direction``, relative to its centroid, in world axes."""
+def support(vertices, size, matrix, direction):
+    """The vertex of a hull farthest along ``direction``, relative to its centroid, in world axes.
+
+    ``vertices`` (v, 3) are those of size 1 in body axes.
+    """
     local = apply_transposed(matrix, direction)
-    best = table.vertex_start[shape]
+    best = 0
     farthest = -math.inf
-    for v in range(table.vertex_start[shape], table.vertex_start[shape + 1]):
-        reach = dot(row(table.vertex, v), local)
+    for v in range(len(vertices)):
+        reach = dot(row(vertices, v), local)
         if reach > farthest:
             farthest = reach
             best = v
-    return apply(matrix, scaled(row(table.vertex, best), size))
+    return apply(matrix, scaled(row(vertices, best), size))
 
 
 @kernel
@@ -119,23 +122,31 @@ def _drop_unused(corners, of_a, of_b, weights, count):
 
 
 @kernel
-def hull_distance(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset, only_whether):
+def apart_along(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, direction):
+    """How far hull b, centred at ``offset`` from hull a, lies beyond it along ``direction``, times its length."""
+    a = support(vertices_a, size_a, matrix_a, direction)
+    b = add(offset, support(vertices_b, size_b, matrix_b, scaled(direction, -1.0)))
+    return dot(direction, sub(b, a))
+
+
+@kernel
+def hull_distance(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching, only_whether):
     """Distance of hull b, centred at ``offset`` from hull a, and the nearest points relative to a's centroid.
 
-    Returns (distance, point of a, point of b); distance 0 means that they touch or overlap. With ``only_whether``
-    any positive number may stand for the distance of hulls that are apart: the first separating direction ends it.
+    Returns (distance, point of a, point of b); distance 0 means that they overlap or are nearer than ``touching``.
+    With ``only_whether`` any positive number may stand for the distance of hulls that are apart: the first
+    separating direction ends the search.
     """
     corners, of_a, of_b = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
     weights = np.empty(4)
     nearest = np.empty((1, 3))
-    touching = TOUCHING * (table.radius[shape_a] * size_a + table.radius[shape_b] * size_b)
 
     v = offset if norm(offset) > 0.0 else (1.0, 0.0, 0.0)
     length2 = math.inf
     count = 0
     for _ in range(_MAX_STEPS):
-        a = support(table, shape_a, size_a, matrix_a, v)
-        b = add(offset, support(table, shape_b, size_b, matrix_b, scaled(v, -1.0)))
+        a = support(vertices_a, size_a, matrix_a, v)
+        b = add(offset, support(vertices_b, size_b, matrix_b, scaled(v, -1.0)))
         w = sub(b, a)
         gain = dot(v, w)
         if only_whether and gain > touching * norm(v):

@@ -5,7 +5,7 @@ from particlesim.jit import kernel
 from particlesim.narrow_phase.hull_hull import hull_hull, hulls_overlap
 from particlesim.narrow_phase.sphere_hull import hull_sphere
 from particlesim.narrow_phase.sphere_sphere import sphere_sphere
-from particlesim.vec import add, norm, put, row, scaled
+from particlesim.vec import add, put, row, scaled
 
 
 @kernel
@@ -39,13 +39,12 @@ def pair_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset
     return hull_hull(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points)
 
 
-@kernel
+@kernel(inline=True)
 def pair_overlaps(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
     """Whether two particles touch or overlap; cheaper than the contact for most that do not."""
-    reach = table.radius[shape_a] * size_a + table.radius[shape_b] * size_b
-    if norm(offset) > reach:
-        return False
     if table.kind[shape_a] == SPHERE or table.kind[shape_b] == SPHERE:
         separation, _, _ = pair_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points)
-        return separation <= 0.0
-    return hulls_overlap(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset)
+        overlap = separation <= 0.0
+    else:
+        overlap = hulls_overlap(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset)
+    return overlap

@@ -1,9 +1,10 @@
 """Work shared between threads by ranges.
 
-The kernels of the broad phases are plain serial kernels over a range ``first .. last`` that release the GIL.  A few
-objects take one range; many take one range a thread, or more for work that is uneven, from a pool of threads.  The
-same kernel serves both, so it is compiled once, without the seconds that ``parallel=True`` costs each kernel, and a
-call with a few hundred boxes pays for no threads.
+Kernels over many items are plain serial kernels over a range ``first .. last`` that release the GIL.  A few items
+take one range; many take one range a thread, or more for work that is uneven, from a pool of threads.  The same
+kernel serves both, so it is compiled once, without the seconds and the 0.1 ms a call that numba's own ``parallel=True``
+costs, and a call with a few hundred items pays for no threads.  A kernel writes only to the items of its range, or
+returns a list of its own, so that results do not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ import numba
 
 Result = TypeVar("Result")
 
-# Fewer objects than this are done by the calling thread: starting a thread costs about 0.1 ms.
+# Fewer items than this are done by the calling thread: starting a thread costs about 0.1 ms.
 ALONE = 16384
 
 
 class Crew:
-    """The threads (``numba.get_num_threads()``) for one search among ``count`` boxes; closed by ``with``."""
+    """The threads (``numba.get_num_threads()``) for one task over ``count`` items; closed by ``with``."""
 
     def __init__(self, count: int) -> None:
         self.threads = 1 if count < ALONE else numba.get_num_threads()
