@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from particlesim.ledger import Ledger
     from particlesim.narrow_phase import Pose, Separation, separation
     from particlesim.pipeline import render, simulate
-    from particlesim.render import RenderError
+    from particlesim.rendering import RenderError
     from particlesim.scene import Scene
     from particlesim.scene.file import SceneError, load_scene
     from particlesim.shapes import CATALOGUE, Shape
@@ -33,7 +33,7 @@ _HOMES = {
     "CATALOGUE": "shapes",
     "Ledger": "ledger",
     "Pose": "narrow_phase",
-    "RenderError": "render",
+    "RenderError": "rendering",
     "Scene": "scene",
     "SceneError": "scene.file",
     "Separation": "narrow_phase",

@@ -24,7 +24,7 @@ class Ledger:
     steps: int
     kinetic_translational: float
     kinetic_rotational: float
-    potential: float  # in the field of gravity, zero at the origin
+    potential: float  # in the field of gravity, zero at the corner of the world that it points to
     momentum: np.ndarray
     angular_momentum: np.ndarray
     impacts: int
@@ -55,7 +55,9 @@ def sums(world, constants, state):
     """Rows (3, 3): energies of translation, of rotation and in the field; momentum; angular momentum."""
     translational = rotational = potential = 0.0
     momentum = angular = (0.0, 0.0, 0.0)
-    gravity = (world.gravity[0], world.gravity[1], world.gravity[2])
+    gravity = row(world.gravity.reshape(1, 3), 0)
+    bottom = np.where(world.gravity > 0.0, world.upper, world.lower)
+    lowest = dot(gravity, row(bottom.reshape(1, 3), 0))
     for i in range(len(constants.mass)):
         m, v, x = constants.mass[i], row(state.velocity, i), row(state.position, i)
         own = row(state.angular_momentum, i)
@@ -67,7 +69,7 @@ def sums(world, constants, state):
         )
         translational += 0.5 * m * dot(v, v)
         rotational += 0.5 * dot(own, particle_spin(constants, state, i))
-        potential -= m * dot(gravity, x)
+        potential += m * (lowest - dot(gravity, x))
         momentum = along(momentum, v, m)
         angular = add(angular, add(own, scaled(cross(x, v), m)))
     out = np.empty((3, 3))

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from particlesim.render import Renderer, write_image, write_movie
-from particlesim.render.cells import octree_cells
+from particlesim.rendering import Renderer, write_image, write_movie
+from particlesim.rendering.cells import octree_cells
 from particlesim.scene import Scene
 from particlesim.simulation import Simulation
 from particlesim.summary import Summary

@@ -35,10 +35,11 @@ class Simulation:
     def __init__(self, scene: Scene, broad_phase: str | None = None, threads: int | None = None) -> None:
         self.scene = scene
         self.shapes, self.table, self.world, self.constants, self.state = build(scene)
-        method = scene.solver.broad_phase
-        parameters = method.model_dump(exclude={"kind"}) if broad_phase in (None, method.kind) else {}
-        self._find_pairs = METHODS[broad_phase or method.kind]
-        self._parameters = parameters
+        chosen = scene.solver.broad_phase
+        if broad_phase not in (None, *METHODS):
+            raise ValueError(f"unknown broad phase '{broad_phase}'; there are {', '.join(METHODS)}")
+        self._find_pairs = METHODS[broad_phase or chosen.kind]
+        self._parameters = chosen.model_dump(exclude={"kind"}) if broad_phase in (None, chosen.kind) else {}
         self._threads = threads
         self._frame_time = 1.0 / scene.movie.fps
         n = len(self.constants.mass)

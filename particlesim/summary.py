@@ -12,7 +12,7 @@ from particlesim.trajectory import Frame
 class Summary:
     """Gathers frames as they pass: ``add`` each, then read the attributes.
 
-    Energies are compared with the largest kinetic energy seen, so that a start from rest counts as well.
+    Energies are compared with what there was at first, or with the largest kinetic energy seen if that is more.
     """
 
     def __init__(self, total_mass: float, gravity: Any) -> None:
@@ -51,8 +51,9 @@ class Summary:
 
     @property
     def worst_energy_drift(self) -> float:
-        """Largest change of the total energy since the first frame, over the largest kinetic energy."""
-        return self._largest_change / self._largest_kinetic if self._largest_kinetic else 0.0
+        """Largest change of the total energy since the first frame, as a fraction of it."""
+        scale = max(self._largest_kinetic, _energy(self._first) if self._first else 0.0)
+        return self._largest_change / scale if scale else 0.0
 
     @property
     def momentum_error(self) -> float:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from particlesim.render.camera import FILL, light_azimuth, view_at
+from particlesim.rendering.camera import FILL, light_azimuth, view_at
 from particlesim.scene import Scene
 
 SPHERES = [{"shape": "sphere", "count": 1}]

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from particlesim import shapes
-from particlesim.render import geometry
-from particlesim.render.cells import cell_lines
-from particlesim.render.colour import PALETTE, ParticleColours, map_colours, parse, shape_colours
-from particlesim.render.overlay import Readout, energy_drift, readout_rows
+from particlesim.rendering import geometry
+from particlesim.rendering.cells import cell_lines
+from particlesim.rendering.colour import PALETTE, ParticleColours, map_colours, parse, shape_colours
+from particlesim.rendering.overlay import Readout, energy_change, readout_rows
 from particlesim.scene import Scene
 from particlesim.trajectory import Frame, Header
 
@@ -87,18 +87,18 @@ def test_readout_says_what_the_ledger_knows():
         ("time", "1.50 s"),
         ("particles", "1,234"),
         ("impacts", "12,345"),
-        ("energy drift", "−2.5 %"),
+        ("energy change", "–2.5 %"),
     ]
     assert [name for name, _ in readout_rows(frame(np.zeros((1, 3))), first)] == ["time", "particles"]
-    assert readout_rows(first, first)[-1] == ("energy drift", "0")
+    assert readout_rows(first, first)[-1] == ("energy change", "0")
 
 
-def test_energy_drift_is_relative_to_the_parts_not_to_a_sum_that_may_vanish():
+def test_energy_change_is_relative_to_the_parts_not_to_a_sum_that_may_vanish():
     first = frame(np.zeros((1, 3)), kinetic_translational=2.0, potential=-2.0)
     later = frame(np.zeros((1, 3)), kinetic_translational=2.0, potential=-1.0)
-    assert energy_drift(later, first) == pytest.approx(0.25)
+    assert energy_change(later, first) == pytest.approx(0.25)
     nothing = frame(np.zeros((1, 3)), potential=0.0)
-    assert energy_drift(nothing, nothing) == 0.0
+    assert energy_change(nothing, nothing) == 0.0
 
 
 @pytest.mark.parametrize("size", [(64, 64), (200, 120), (720, 1280), (1280, 720)])

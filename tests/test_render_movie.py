@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from particlesim.render import RenderError, movie, write_image, write_movie
+from particlesim.rendering import RenderError, movie, write_image, write_movie
 
 SIZE = (130, 98)  # even, but no multiples of the 16 pixels that encoders like
 

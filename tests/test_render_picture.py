@@ -5,7 +5,7 @@ import pytest
 
 from particlesim import shapes
 from particlesim.constants import SPHERE
-from particlesim.render import Renderer, RenderError, platform
+from particlesim.rendering import Renderer, RenderError, platform
 from particlesim.scene import Scene
 from particlesim.trajectory import Frame, Header
 
@@ -243,7 +243,7 @@ def test_hidden_particles_that_are_left_out_change_no_pixel(monkeypatch):
         with Renderer(scene, header) as renderer:
             left_out = renderer.draw(frame)
             drawn = sum(layer.visible for layer in renderer._particles)
-            monkeypatch.setattr("particlesim.render.renderer._MANY", 10**9)
+            monkeypatch.setattr("particlesim.rendering.renderer._MANY", 10**9)
             everything = renderer.draw(frame)
             monkeypatch.undo()
         assert drawn < 4000

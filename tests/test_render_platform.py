@@ -6,12 +6,12 @@ import sys
 
 import pytest
 
-from particlesim.render import RenderError, platform
+from particlesim.rendering import RenderError, platform
 
 DRAW = """
 import numpy as np
 from particlesim import shapes
-from particlesim.render import Renderer, RenderError
+from particlesim.rendering import Renderer, RenderError
 from particlesim.scene import Scene
 from particlesim.trajectory import Frame, Header
 scene = Scene(world={"size": (2, 2, 2)}, particles=[{"shape": "sphere", "count": 1}],
@@ -36,7 +36,7 @@ def draw(**environment):
 
 
 def test_importing_the_renderer_is_cheap():
-    code = "import sys, particlesim.render; print(sorted({'OpenGL', 'pyrender', 'numba'} & set(sys.modules)))"
+    code = "import sys, particlesim.rendering; print(sorted({'OpenGL', 'pyrender', 'numba'} & set(sys.modules)))"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "[]"
 

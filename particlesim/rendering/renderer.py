@@ -7,11 +7,11 @@ from types import TracebackType
 import numpy as np
 
 from particlesim.constants import SPHERE
-from particlesim.render import geometry, platform
-from particlesim.render.camera import View, light_azimuth, view_at
-from particlesim.render.cells import cell_lines
-from particlesim.render.colour import ParticleColours, encoded
-from particlesim.render.overlay import Readout
+from particlesim.rendering import geometry, platform
+from particlesim.rendering.camera import View, light_azimuth, view_at
+from particlesim.rendering.cells import cell_lines
+from particlesim.rendering.colour import ParticleColours, encoded
+from particlesim.rendering.overlay import Readout
 from particlesim.scene import Scene
 from particlesim.trajectory import Frame, Header
 
@@ -115,7 +115,7 @@ class Renderer:
         """Which of the particles, given in camera axes and nearest first, are not hidden behind others, (n,) bool."""
         if len(seen) < _MANY:
             return np.ones(len(seen), dtype=np.bool_)
-        from particlesim.render.culling import in_sight  # noqa: PLC0415  (numba is slow to import)
+        from particlesim.rendering.culling import in_sight  # noqa: PLC0415  (numba is slow to import)
 
         slope = float(np.tan(0.5 * view.field_of_view))
         return in_sight(seen, self._inner[order], self._outer[order], slope, self._size)

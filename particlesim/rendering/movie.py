@@ -17,8 +17,8 @@ import numpy as np
 from PIL import Image
 
 from particlesim.files import appearing
-from particlesim.render.errors import RenderError
-from particlesim.render.platform import ffmpeg
+from particlesim.rendering.errors import RenderError
+from particlesim.rendering.platform import ffmpeg
 
 # Images that wait for the encoder: enough to even out the two, few enough to cost little memory.
 _WAITING = 4

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from particlesim.render import geometry
-from particlesim.render.colour import map_colours
+from particlesim.rendering import geometry
+from particlesim.rendering.colour import map_colours
 from particlesim.scene import Scene
 from particlesim.scene.world import Octree
 from particlesim.trajectory import Frame, Header

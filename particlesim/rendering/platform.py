@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from particlesim.render.errors import RenderError
+from particlesim.rendering.errors import RenderError
 
 PLATFORMS = ("egl", "osmesa")
 FIX = "apt-get install -y --no-install-recommends libegl1 libgl1"
@@ -57,7 +57,7 @@ def open_bridge(found: Platform) -> Any:
     # PyOpenGL reads the platform here, at its first import and never again.
     os.environ["PYOPENGL_PLATFORM"] = found.name
     try:
-        from particlesim.render import pyrender_bridge  # noqa: PLC0415
+        from particlesim.rendering import pyrender_bridge  # noqa: PLC0415
     except (ImportError, AttributeError, OSError) as error:
         raise RenderError(f"cannot draw: {_one_line(str(error))}; install what OpenGL needs with: {FIX}") from error
     return pyrender_bridge

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from particlesim.render.errors import RenderError
-from particlesim.render.platform import Platform
+from particlesim.rendering.errors import RenderError
+from particlesim.rendering.platform import Platform
 
 # pyrender's window needs pyglet, and pyglet needs X libraries; nothing here opens a window.
 _viewer = types.ModuleType("pyrender.viewer")

@@ -1,4 +1,4 @@
-"""The readout in the corner: time, particles, impacts and how far the energy has drifted."""
+"""The readout in the corner: time, particles, impacts and how much the energy has changed."""
 
 from __future__ import annotations
 
@@ -76,11 +76,11 @@ def readout_rows(frame: Frame, first: Frame) -> list[tuple[str, str]]:
     if "impacts" in frame.ledger:
         rows.append(("impacts", _grouped(round(frame.ledger["impacts"]))))
     if any(key in frame.ledger for key in _ENERGIES):
-        rows.append(("energy drift", _drift_text(energy_drift(frame, first))))
+        rows.append(("energy change", _change_text(energy_change(frame, first))))
     return rows
 
 
-def energy_drift(frame: Frame, first: Frame) -> float:
+def energy_change(frame: Frame, first: Frame) -> float:
     """Change of the total energy since ``first``, relative to the kinetic energy and depth of potential there."""
     now, then = ([f.ledger.get(key, 0.0) for key in _ENERGIES] for f in (frame, first))
     scale = sum(abs(part) for part in then) or sum(abs(part) for part in now)
@@ -91,8 +91,9 @@ def _grouped(number: int) -> str:
     return f"{number:,}"
 
 
-def _drift_text(drift: float) -> str:
-    if drift == 0.0:
+def _change_text(change: float) -> str:
+    if change == 0.0:
         return "0"
-    text = f"{100.0 * drift:+.1f} %" if abs(drift) >= 1e-3 else f"{drift:+.1e}"
-    return text.replace("-", "\u2212")
+    # An en dash: as wide as the plus sign, and the font has no minus sign.
+    text = f"{100.0 * change:+.1f} %" if abs(change) >= 1e-3 else f"{change:+.0e}"
+    return text.replace("-", "\u2013")

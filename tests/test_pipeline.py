@@ -1,0 +1,85 @@
+"""From a scene to a movie: decoded, counted, looked at."""
+
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+import particlesim as ps
+from tests.worlds import gas, listed, scene
+
+SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))
+SMALL = {"movie": {"fps": 10.0, "resolution": [320, 180]}, "duration": 0.5}
+
+
+@pytest.mark.parametrize("path", SCENES, ids=lambda p: p.stem)
+def test_every_scene_runs(path):
+    loaded = ps.load_scene(path)
+    sim = ps.Simulation(loaded)
+    before = sim.ledger
+    sim.run(steps=10)
+    after = sim.ledger
+    assert after.largest_overlap < 0.05 * sim.particles.inradius.min()
+    assert after.energy <= before.energy * (1 + 1e-9)
+
+
+def test_a_movie_has_its_frames_and_shows_its_particles(tmp_path):
+    dark = listed("sphere", {"position": (0, 0, 0), "velocity": (0.5, 0, 0)}, colour="#101010")
+    look = {"kind": "look-at", "position": (0, -8, 0)}
+    s = scene(dark, size=(6, 6, 6), boundary="open", camera=look, show={"box": False, "readout": False}, **SMALL)
+    calls = []
+    summary = ps.render(s, tmp_path / "movie.mp4", progress=lambda *call: calls.append(call))
+    movie = np.array(list(iio.imiter(tmp_path / "movie.mp4", plugin="FFMPEG")))
+    assert movie.shape == (6, 180, 320, 3)
+    assert summary.frames == 6
+    assert calls[-1] == ("rendering", 6, 6)
+    background = movie[0, 0, 0].astype(int)
+    changed = np.abs(movie.astype(int) - background).sum(axis=3) > 60
+    for k, picture in enumerate(changed):
+        rows, columns = np.nonzero(picture)
+        # One metre at 8 m seen under 40 degrees over 180 rows; a ball looks a little larger than its diameter.
+        scale = 180 / (2 * np.tan(np.radians(20)) * 8)
+        assert columns.mean() == pytest.approx(160 + scale * 0.5 * 0.1 * k, abs=1.0)
+        assert rows.mean() == pytest.approx(90, abs=1.0)
+        assert rows.max() - rows.min() == pytest.approx(scale, abs=2.0)
+    poster = iio.imread(tmp_path / "movie.png")
+    assert poster.shape == (180, 320, 3)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["movie.mp4", "movie.png"]
+
+
+def test_a_trajectory_renders_to_the_movie_of_its_scene(tmp_path):
+    s = gas(5, **SMALL)
+    written = ps.simulate(s, tmp_path / "run.gsd")
+    direct = ps.render(s, tmp_path / "direct.mp4")
+    read = ps.render(tmp_path / "run.gsd", tmp_path / "read.mp4")
+    assert written.impacts == direct.impacts == read.impacts > 0
+    assert "simulating" not in read.seconds
+    a, b = (np.array(list(iio.imiter(tmp_path / n, plugin="FFMPEG"))).astype(int) for n in ("direct.mp4", "read.mp4"))
+    # Single precision moves an edge by far less than a pixel.
+    assert a.shape == b.shape
+    assert np.abs(a - b).mean() < 0.1
+
+
+def test_the_same_scene_gives_the_same_bytes(tmp_path):
+    for name in ("one.mp4", "two.mp4"):
+        ps.render(gas(5, **SMALL), tmp_path / name)
+    assert (tmp_path / "one.mp4").read_bytes() == (tmp_path / "two.mp4").read_bytes()
+
+
+def test_the_summary_adds_up(tmp_path):
+    summary = ps.simulate(gas(5, gravity=(0, 0, -3), **SMALL), tmp_path / "run.gsd")
+    assert summary.frames == 6
+    assert summary.simulated_seconds == pytest.approx(0.5)
+    assert summary.worst_energy_drift < 1e-13
+    assert summary.momentum_error < 1e-12
+    assert summary.largest_overlap < 0.01
+    assert set(summary.seconds) == {"simulating"}
+
+
+def test_octree_cells_are_drawn_when_asked_for(tmp_path):
+    plain, with_cells = gas(5, **SMALL), gas(5, show={"cells": True}, **SMALL)
+    for name, s in (("plain", plain), ("cells", with_cells)):
+        ps.render(s, tmp_path / f"{name}.mp4")
+    a, b = (iio.imread(tmp_path / f"{n}.png").astype(int) for n in ("plain", "cells"))
+    assert (np.abs(a - b).sum(axis=2) > 30).mean() > 0.01
