@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +27,12 @@ _DEFAULT_DENSITY = 1000.0
 # Particles that a list puts into each other deeper than this fraction of their sizes are refused.
 _TOLERATED_OVERLAP = 1e-9
 
+# A body whose inscribed sphere is this much smaller than its bounding one is a sheet.
+_FLATTEST = 1e-6
+
+# Bytes a particle takes: constants, state, boxes, and the broad phase and the candidate pairs at their largest.
+BYTES_PER_PARTICLE = 1000
+
 _BOUNDARIES = {"wall": WALL, "periodic": PERIODIC, "open": OPEN}
 
 
@@ -40,16 +48,18 @@ class Built(NamedTuple):
 
 def build(scene: Scene) -> Built:
     """The arrays a simulation of ``scene`` starts from. SceneError if something does not fit or cannot be read."""
+    check_memory(scene.number)
     randoms = [np.random.default_rng([scene.seed, g]) for g in range(len(scene.particles))]
     shapes, shape_of_group = _shapes(scene)
     table = stack_shapes(shapes)
     world = build_world(scene)
     constants = _constants(scene, shapes, shape_of_group, randoms)
     _check_sizes(scene, world, constants)
+    _check_volume(scene, world, shapes, constants)
     orientation = _orientations(scene, shapes, constants, randoms)
     position = positions(scene, table, world, constants, orientation, randoms)
     state = initial_state(scene, constants, position, orientation, randoms)
-    _check_apart(table, world, constants, state)
+    _check_apart(scene, table, world, constants, state)
     return Built(tuple(shapes), table, world, constants, state)
 
 
@@ -77,21 +87,27 @@ def _shapes(scene: Scene) -> tuple[list[Shape], list[int]]:
     numbers: dict[str, int] = {}
     of_group = []
     for g, group in enumerate(scene.particles):
-        parameters = group.shape.model_dump(exclude={"kind"})
-        if isinstance(group.shape, MeshShape):
-            parameters["file"] = scene.folder / group.shape.file
+        if isinstance(group.shape, MeshShape) and not group.shape.file.is_file():
+            raise _shape_error(g, group, "is a folder" if group.shape.file.is_dir() else "no such file")
         try:
-            shape = CATALOGUE[group.shape.kind](**parameters)
+            shape = CATALOGUE[group.shape.kind](**group.shape.model_dump(exclude={"kind"}))
         except (OSError, ValueError) as error:
-            raise SceneError(str(error), _key(g, "shape")) from None
-        if shape.inradius <= 0.0:
-            raise SceneError("is too flat to be a body", _key(g, "shape"))
+            raise _shape_error(g, group, " ".join(str(error).split())) from None
+        if shape.inradius <= _FLATTEST * shape.radius:
+            raise _shape_error(g, group, "is too flat to be a body")
         name = group.shape.model_dump_json()
         if name not in numbers:
             numbers[name] = len(shapes)
             shapes.append(shape)
         of_group.append(numbers[name])
     return shapes, of_group
+
+
+def _shape_error(g: int, group: Group, message: str) -> SceneError:
+    if isinstance(group.shape, MeshShape):
+        file = str(group.shape.file)
+        return SceneError(message.removeprefix(f"{file} "), _key(g, "shape.file"), file)
+    return SceneError(message, _key(g, "shape"))
 
 
 def _sizes(group: Group, random: np.random.Generator) -> np.ndarray:
@@ -119,24 +135,56 @@ def _constants(
     return particle_constants(shapes, shape, group_of, size, density, restitution[group_of])
 
 
+def check_memory(particles: int) -> None:
+    """SceneError if this machine has no memory for so many particles."""
+    needed, there = BYTES_PER_PARTICLE * particles, _memory()
+    if needed > there:
+        message = (
+            f"{particles:,} particles need about {needed / 1e9:,.0f} GB of memory; there are {there / 1e9:,.0f} GB"
+        )
+        raise SceneError(message, "particles")
+
+
+def _memory() -> float:
+    """Bytes of memory that this process may have: the machine's, or what its container is allowed."""
+    machine = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    try:
+        return min(machine, float(Path("/sys/fs/cgroup/memory.max").read_text()))
+    except (OSError, ValueError):  # no container, or one that says "max"
+        return machine
+
+
 def _check_sizes(scene: Scene, world: World, constants: Constants) -> None:
     """Walls must leave room, and a particle must not meet itself round a periodic world."""
-    for g in range(len(scene.particles)):
+    for g, group in enumerate(scene.particles):
         members = constants.group == g
+        value = group.size.value if isinstance(group.size, FixedSize) else None
         widest = 2.0 * constants.radius[members].max(initial=0.0)
         narrowest = 2.0 * constants.inradius[members].max(initial=0.0)
         for axis, edge in enumerate(world.upper - world.lower):
             if world.boundary[axis] == PERIODIC and widest >= 0.5 * edge:
-                message = f"must span less than half of the periodic world, {0.5 * edge:g} m; it spans {widest:g} m"
-                raise SceneError(message, _key(g, "size"))
-            if world.boundary[axis] == WALL and narrowest > edge:
-                raise SceneError(
-                    f"is {narrowest:g} m thick and does not fit between walls {edge:g} m apart", _key(g, "size")
+                message = (
+                    f"too large: particles span {widest:.4g} m; "
+                    f"in a periodic world they must span less than half of it, {0.5 * edge:.4g} m"
                 )
+                raise SceneError(message, _key(g, "size"), value)
+            if world.boundary[axis] == WALL and narrowest > edge:
+                message = f"too large: particles are {narrowest:.4g} m thick, between walls {edge:.4g} m apart"
+                raise SceneError(message, _key(g, "size"), value)
 
 
-def _quaternion(orientation: tuple[float, ...] | Turn) -> np.ndarray:
-    """A scene's orientation as a unit quaternion (w, x, y, z)."""
+def _check_volume(scene: Scene, world: World, shapes: list[Shape], constants: Constants) -> None:
+    """What is enclosed must have room."""
+    volumes = np.array([s.volume for s in shapes])[constants.shape] * constants.size**3
+    fill = float(volumes.sum() / (world.upper - world.lower).prod())
+    if fill > 1.0 and not (world.boundary == OPEN).any():
+        raise SceneError(f"do not fit: their volumes add up to {fill:.3g} times the world's", "particles")
+
+
+def _quaternion(orientation: tuple[float, ...] | Turn | str) -> np.ndarray:
+    """A scene's orientation as a unit quaternion (w, x, y, z); a word stands for the axes of the world."""
+    if isinstance(orientation, str):
+        return np.array([1.0, 0.0, 0.0, 0.0])
     if isinstance(orientation, Turn):
         axis = np.array(orientation.axis) / np.linalg.norm(orientation.axis)
         half = 0.5 * math.radians(orientation.angle)
@@ -161,8 +209,6 @@ def _orientations(
             q = np.array([_quaternion(pose.orientation) for pose in group.placement.poses])
         elif group.orientation == "random":
             q = random_quaternions(random, group.number)
-        elif group.orientation == "aligned":
-            q = np.tile([1.0, 0.0, 0.0, 0.0], (group.number, 1))
         else:
             q = np.tile(_quaternion(group.orientation), (group.number, 1))
         frame = shapes[int(constants.shape[constants.group == g][0])].orientation if group.number else None
@@ -172,25 +218,36 @@ def _orientations(
     return np.ascontiguousarray(np.concatenate(parts))
 
 
-def _check_apart(table: ShapeTable, world: World, constants: Constants, state: State) -> None:
+def _check_apart(scene: Scene, table: ShapeTable, world: World, constants: Constants, state: State) -> None:
     """No particle may start inside another or outside a wall; touching is allowed."""
     reach = constants.radius[:, None]
     pairs = find_pairs(state.position - reach, state.position + reach, period=world.period)
     everyone = np.ones(len(constants.mass), dtype=np.bool_)
     points = np.empty((MAX_MANIFOLD, 3))
     for contacts in (
-        touching_pairs(table, world, constants, state, pairs, everyone),
         touching_walls(table, world, constants, state, everyone),
+        touching_pairs(table, world, constants, state, pairs, everyone),
     ):
         for i, j in contacts.tolist():
             separation, _, _, _ = contact_now(table, world, constants, state, i, j, points)
             if separation < -_TOLERATED_OVERLAP * constants.radius[i]:
-                other = _name(constants, j) if j >= 0 else f"the {WALL_NAMES[-1 - j]} wall"
-                raise SceneError(f"{_name(constants, i)} starts {-separation:.3g} m deep in {other}", "particles")
+                deep = f"{-separation:.3g} m"
+                if j < 0:
+                    raise _start_error(scene, constants, i, f"sticks {deep} through the {WALL_NAMES[-1 - j]} wall")
+                g, k = _place_in_group(constants, j)
+                raise _start_error(scene, constants, i, f"starts {deep} inside particle {k} of particles[{g}]")
 
 
-def _name(constants: Constants, i: int) -> str:
-    """A particle as its scene knows it."""
-    group = int(constants.group[i])
-    first = int(np.searchsorted(constants.group, group))
-    return f"particle {i - first} of particles[{group}]"
+def _start_error(scene: Scene, constants: Constants, i: int, wrong: str) -> SceneError:
+    """What is wrong with where particle ``i`` starts, said of what put it there."""
+    g, k = _place_in_group(constants, i)
+    placement = scene.particles[g].placement
+    if isinstance(placement, ListPlacement):
+        return SceneError(wrong, _key(g, f"placement.poses[{k}].position"), placement.poses[k].position)
+    return SceneError(f"particle {k} {wrong}", _key(g, "placement"))
+
+
+def _place_in_group(constants: Constants, i: int) -> tuple[int, int]:
+    """Group of particle ``i`` and its number there."""
+    g = int(constants.group[i])
+    return g, i - int(np.searchsorted(constants.group, g))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from particlesim.scene import Scene
     from particlesim.summary import Summary
 
 app = typer.Typer(
@@ -20,36 +23,71 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # help in plain text: rich takes longer to import than all the rest
 )
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        print(f"particlesim {importlib.metadata.version('particlesim')}")
+        raise typer.Exit
+
+
+def _at_least_one(threads: int | None) -> int | None:
+    if threads is not None and threads < 1:
+        raise typer.BadParameter("must be 1 or more")
+    return threads
+
 
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
-Threads = Annotated[int | None, typer.Option("--threads", min=1, help="Threads to simulate with.  [default: all]")]
+Threads = Annotated[
+    int | None, typer.Option("--threads", callback=_at_least_one, help="Threads to simulate with.  [default: all]")
+]
+Version = Annotated[
+    bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+]
 
 
 def main() -> None:
-    """Run the command line. Exit code 2 for wrong input, 1 for what this machine cannot do."""
+    """Run the command line. Exit code 2 for wrong input, 1 for what this machine cannot do, 130 for Ctrl-C."""
     app()
 
 
-@contextmanager
-def _one_line_errors() -> Iterator[None]:
-    """Expected failures as one line on standard error and an exit code."""
-    from particlesim.render import RenderError  # noqa: PLC0415
-    from particlesim.scene.file import SceneError  # noqa: PLC0415
+@app.callback()
+def _options(version: Version = False) -> None:
+    """Options of the program itself; its help text is that of ``app``."""
 
+
+@contextmanager
+def _one_line_errors(source: Path) -> Iterator[None]:
+    """Expected failures as one line on standard error and an exit code; anything else is a bug and shows where."""
     try:
-        yield
-    except SceneError as error:
-        _fail(str(error), 2)
-    except (RenderError, OSError) as error:
-        _fail(str(error), 1)
+        from particlesim.rendering import RenderError  # noqa: PLC0415
+        from particlesim.scene.file import SceneError  # noqa: PLC0415
+
+        try:
+            yield
+        except SceneError as error:
+            _fail(str(error if error.file else error.within(source)), 2)
+        except BrokenPipeError:  # whoever reads the output has seen enough; typer ends the program
+            raise
+        except (RenderError, OSError) as error:
+            _fail(_described(error), 1)
+        except (ValueError, RuntimeError) as error:
+            # Errors of other modules of ours, which need not be imported to catch them.
+            if not type(error).__module__.startswith("particlesim."):
+                raise
+            _fail(str(error), 2 if isinstance(error, ValueError) else 1)
     except KeyboardInterrupt:
         _fail("interrupted; nothing was written", 130)
-    except (ValueError, RuntimeError) as error:
-        if type(error).__module__.startswith("particlesim."):
-            _fail(str(error), 2 if isinstance(error, ValueError) else 1)
-        raise
+
+
+def _described(error: Exception) -> str:
+    """An error of ours as it is, one of the system with the file it is about."""
+    if isinstance(error, OSError) and error.strerror:
+        return ": ".join([str(name) for name in (error.filename,) if name] + [error.strerror])
+    return str(error)
 
 
 def _fail(message: str, code: int) -> None:
@@ -57,16 +95,52 @@ def _fail(message: str, code: int) -> None:
     raise typer.Exit(code)
 
 
-def _output(path: Path | None, source: Path, suffix: str) -> Path:
-    """Where the result goes: as told, or to renders/ under the name of the source."""
+@contextmanager
+def _output(path: Path | None, source: Path, suffix: str) -> Iterator[Path]:
+    """Where the result goes: as told, or to renders/ under the name of the source.
+
+    A wrong place is found out before the work, not after it; renders/ does not stay behind if nothing comes of it.
+    """
     if path is not None:
-        return path if path.suffix else path.with_suffix(suffix)
+        path = path if path.suffix or path.is_dir() else path.with_suffix(suffix)
+        _check_output(path, suffix)
+        yield path
+        return
     folder = Path("renders")
+    path = folder / f"{source.stem}{suffix}"
+    is_new = not folder.exists()
     folder.mkdir(exist_ok=True)
-    return folder / f"{source.stem}{suffix}"
+    _check_output(path, suffix)
+    try:
+        yield path
+    except BaseException:
+        if is_new and not any(folder.iterdir()):
+            folder.rmdir()
+        raise
 
 
-@app.command()
+def _check_output(path: Path, suffix: str) -> None:
+    """Exit with a line if no file can appear at ``path``."""
+    if path.is_dir():
+        _fail(f"{path}: is a folder, not a file to write to", 2)
+    if path.suffix.lower() != suffix:
+        _fail(f"{path}: the output must end in {suffix}", 2)
+    if not path.parent.is_dir():
+        _fail(f"{path}: there is no folder {path.parent}", 2)
+    if not os.access(path.parent, os.W_OK):
+        _fail(f"{path}: the folder {path.parent} cannot be written to", 1)
+
+
+def _load(source: Path) -> Scene:
+    """The scene of a file. SceneError if it is wrong."""
+    from particlesim.scene.file import SceneError, load_scene  # noqa: PLC0415
+
+    if source.suffix.lower() in (".gsd", ".mp4"):
+        raise SceneError("must be a scene file (TOML)", file=source)
+    return load_scene(source)
+
+
+@app.command(short_help="Make a movie of a scene or of a trajectory.")
 def render(
     source: Annotated[Path, typer.Argument(metavar="SCENE|TRAJECTORY", help="A scene file or a .gsd trajectory.")],
     output: Annotated[
@@ -76,21 +150,20 @@ def render(
     threads: Threads = None,
 ) -> None:
     """Simulate a scene, or read a trajectory, and make a movie of it, with a poster (PNG) beside it."""
-    with _one_line_errors():
+    with _one_line_errors(source):
         from particlesim.progress import shown_progress  # noqa: PLC0415
-        from particlesim.scene.file import load_scene  # noqa: PLC0415
 
-        scene = None if source.suffix == ".gsd" else load_scene(source)
+        movable = source if source.suffix.lower() == ".gsd" else _load(source)
         from particlesim.pipeline import render as make_movie  # noqa: PLC0415
 
-        path = _output(output, source, ".mp4")
-        with shown_progress(quiet) as progress:
-            summary = make_movie(scene or source, path, progress=progress, threads=threads)
-        if not quiet:
-            _print_summary(summary, path)
+        with _output(output, source, ".mp4") as path:
+            with shown_progress(quiet) as progress:
+                summary = make_movie(movable, path, progress=progress, threads=threads)
+            if not quiet:
+                _print_summary(summary, path)
 
 
-@app.command()
+@app.command(short_help="Simulate a scene and write its trajectory.")
 def simulate(
     scene: SceneArgument,
     output: Annotated[
@@ -100,44 +173,43 @@ def simulate(
     threads: Threads = None,
 ) -> None:
     """Simulate a scene and write its trajectory (GSD): no OpenGL, no movie."""
-    with _one_line_errors():
+    with _one_line_errors(scene):
         from particlesim.progress import shown_progress  # noqa: PLC0415
-        from particlesim.scene.file import load_scene  # noqa: PLC0415
 
-        loaded = load_scene(scene)
+        loaded = _load(scene)
         from particlesim.pipeline import simulate as write_trajectory  # noqa: PLC0415
 
-        path = _output(output, scene, ".gsd")
-        with shown_progress(quiet) as progress:
-            summary = write_trajectory(loaded, path, progress=progress, threads=threads)
-        if not quiet:
-            _print_summary(summary, path)
+        with _output(output, scene, ".gsd") as path:
+            with shown_progress(quiet) as progress:
+                summary = write_trajectory(loaded, path, progress=progress, threads=threads)
+            if not quiet:
+                _print_summary(summary, path)
 
 
-@app.command()
+@app.command(short_help="Validate a scene and say what it amounts to.")
 def check(scene: SceneArgument) -> None:
     """Validate a scene and say what it amounts to, without simulating it."""
-    with _one_line_errors():
-        from particlesim.scene.file import load_scene  # noqa: PLC0415
-
-        loaded = load_scene(scene)
+    with _one_line_errors(scene):
+        loaded = _load(scene)
         from particlesim.survey import survey  # noqa: PLC0415
 
         _print_table(scene.name, survey(loaded))
 
 
-@app.command()
+@app.command(short_help="Say what this machine has and what is missing.")
 def doctor() -> None:
     """Say what this machine has for simulating and drawing, and how to get what is missing."""
     from particlesim.diagnosis import diagnose  # noqa: PLC0415
 
     findings = diagnose()
-    _print_table("particlesim", [(finding.what, finding.text) for finding in findings])
-    if not all(finding.good for finding in findings):
-        raise typer.Exit(1)
+    _print_table("particlesim", [(f.what, f.text if f.good else "missing, see below") for f in findings])
+    missing = [f"{finding.what}: {finding.text}" for finding in findings if not finding.good]
+    if missing:
+        # Below the table and on a line of its own, so that a command can be copied whole.
+        _fail("\n".join(missing), 1)
 
 
-@app.command()
+@app.command(short_help="Print the JSON Schema of scene files.")
 def schema() -> None:
     """Print the JSON Schema of scene files, for editors that complete and check TOML."""
     from particlesim.scene import Scene  # noqa: PLC0415
@@ -148,12 +220,14 @@ def schema() -> None:
 def _print_table(title: str, rows: list[tuple[str, Any]]) -> None:
     from rich.console import Console  # noqa: PLC0415
     from rich.table import Table  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
 
-    table = Table(title=title, show_header=False, title_justify="left")
+    table = Table(title=Text(title), show_header=False, title_justify="left")
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
     for name, value in rows:
-        table.add_row(name, str(value))
+        # As Text: square brackets in names of groups and files are no markup.
+        table.add_row(Text(name), Text(str(value)))
     Console().print(table)
 
 

@@ -21,10 +21,7 @@ STEP_FRACTION = 0.2
 # angle].  Rounding turns a face by about 1e-15; a fall of one radius at this angle shifts the contact by 1e-6 of it.
 PARALLEL_TOLERANCE = 1e-6
 
-# Vertices this close to the deepest one, as a fraction of the hull's bounding radius, belong to the contact patch.
-PATCH_TOLERANCE = 1e-6
-
-# An octagon: the most points a contact patch keeps; more do not change the impulse, whose first point is their mean.
+# The most points a contact patch keeps, as two squares across each other have. The impulse acts in their middle first.
 MAX_MANIFOLD = 8
 
 # Under gravity a particle that meets something more slowly than a fall from this fraction of its inscribed radius

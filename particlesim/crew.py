@@ -9,12 +9,11 @@ returns a list of its own, so that results do not depend on the number of thread
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 from typing import TypeVar
-
-import numba
 
 Result = TypeVar("Result")
 
@@ -22,11 +21,29 @@ Result = TypeVar("Result")
 ALONE = 16384
 
 
+# How many threads a crew has; None for one a processor that this process may use.
+_threads: int | None = None
+
+
+def use_threads(count: int | None) -> None:
+    """Let crews made from now on have ``count`` threads, or one a processor. ValueError if it is below 1."""
+    global _threads  # noqa: PLW0603  (a setting of the process, as the number of its processors is)
+    if count is not None and count < 1:
+        raise ValueError(f"the number of threads must be at least 1, not {count}")
+    _threads = count
+
+
+def available_threads() -> int:
+    """How many threads a crew for much work has."""
+    affinity = getattr(os, "sched_getaffinity", None)  # not every system can tell
+    return _threads or (len(affinity(0)) if affinity else os.cpu_count() or 1)
+
+
 class Crew:
-    """The threads (``numba.get_num_threads()``) for one task over ``count`` items; closed by ``with``."""
+    """The threads (see ``use_threads``) for one task over ``count`` items; closed by ``with``."""
 
     def __init__(self, count: int) -> None:
-        self.threads = 1 if count < ALONE else numba.get_num_threads()
+        self.threads = 1 if count < ALONE else available_threads()
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
 
     def __enter__(self) -> Crew:

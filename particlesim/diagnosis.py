@@ -8,7 +8,13 @@ from typing import NamedTuple
 import numba
 
 from particlesim.jit import CACHE_FOLDER
-from particlesim.render import RenderError, describe, describe_ffmpeg
+from particlesim.rendering import RenderError, describe, describe_ffmpeg
+
+# For what is there but does not work; for what is not there, the errors say what to install.
+_REMEDY = {
+    "OpenGL": "install it with: apt-get install -y --no-install-recommends libegl1 libgl1",
+    "ffmpeg": "unset IMAGEIO_FFMPEG_EXE, or install it with: pip install --force-reinstall imageio-ffmpeg",
+}
 
 
 class Finding(NamedTuple):
@@ -30,5 +36,6 @@ def diagnose() -> list[Finding]:
         try:
             findings.append(Finding(what, True, look()))
         except RenderError as error:
-            findings.append(Finding(what, False, str(error)))
+            remedy = "" if "install" in str(error) else f"; {_REMEDY[what]}"
+            findings.append(Finding(what, False, f"{error}{remedy}"))
     return findings

@@ -7,6 +7,7 @@ package installed read-only still has a cache.
 
 from __future__ import annotations
 
+import getpass
 import hashlib
 import os
 import tempfile
@@ -37,7 +38,7 @@ def _cache_folder() -> str:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError:
-        folder = Path(tempfile.gettempdir()) / f"particlesim-kernels-{_source_digest()}-{os.getuid()}"
+        folder = Path(tempfile.gettempdir()) / f"particlesim-{getpass.getuser()}-{folder.name}"
         folder.mkdir(parents=True, exist_ok=True)
     return str(folder)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from particlesim.jit import CACHE_FOLDER
 from particlesim.rendering import Renderer, write_image, write_movie
 from particlesim.rendering.cells import octree_cells
 from particlesim.scene import Scene
@@ -84,8 +85,26 @@ def render(
 
 
 def _start(scene: Scene, threads: int | None, progress: Progress | None) -> Simulation:
+    if not any(Path(CACHE_FOLDER).iterdir()):
+        _tell(progress, "compiling, this once", 0, scene.frames)
+        _compile(scene)
     _tell(progress, "preparing", 0, scene.frames)
     return Simulation(scene, threads=threads)
+
+
+def _compile(scene: Scene) -> None:
+    """Run two cubes into each other, so that the kernels a scene needs are compiled before its clock runs."""
+    at, towards = [0.3, 0.3, 0.3], [-1.0, -1.0, -1.0]
+    poses = [{"position": [-1.0, -1.0, -1.0]}, {"position": at, "velocity": towards}]
+    table = {
+        "world": {"size": [4.0, 4.0, 4.0]},
+        "solver": scene.solver,
+        "particles": [
+            {"shape": "cube", "placement": {"kind": "list", "poses": poses}},
+            {"shape": "sphere", "count": 1},
+        ],
+    }
+    Simulation(Scene.model_validate(table)).run(duration=0.5)
 
 
 def _frames(simulation: Simulation) -> Iterator[Frame]:

@@ -8,10 +8,37 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+from rich.text import Text
 
 # Seconds between lines where there is no terminal.
 _INTERVAL = 5.0
+
+# The first frames compile kernels and say nothing about the rest; the time left is counted from this one on.
+_FIRST_TIMED = 2
+
+
+class _Pace:
+    """How long the rest of a phase takes, from how long its frames took."""
+
+    def __init__(self) -> None:
+        self._start: float | None = None
+
+    def left(self, done: int, total: int) -> float | None:
+        """Seconds left after ``done`` of ``total`` frames, None if that cannot be said yet."""
+        now = time.monotonic()
+        if done <= _FIRST_TIMED or self._start is None:
+            self._start = now
+            return None
+        return (now - self._start) / (done - _FIRST_TIMED) * (total - done)
+
+
+def _words(seconds: float) -> str:
+    """A time left as people say it."""
+    if seconds < 99.5:
+        return f"{seconds:.0f} s left"
+    minutes = round(seconds / 60.0)
+    return f"{minutes} min left" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min left"
 
 
 class _Lines:
@@ -19,19 +46,27 @@ class _Lines:
 
     def __init__(self) -> None:
         self._phase = ""
-        self._start = self._last = time.monotonic()
+        self._last = time.monotonic()
+        self._pace = _Pace()
 
     def __call__(self, phase: str, done: int, total: int) -> None:
         now = time.monotonic()
-        if phase != self._phase:
-            self._phase, self._start = phase, now
-        elif now - self._last < _INTERVAL and done < total:
+        left = self._pace.left(done, total)
+        if phase == self._phase and now - self._last < _INTERVAL and done < total:
             return
-        self._last = now
-        left = (now - self._start) / done * (total - done) if done > 1 else None
-        ending = f", {left:.0f} s left" if left is not None and done < total else ""
+        self._phase, self._last = phase, now
         counted = f": frame {done} of {total}" if done else f" {total} frames"
+        ending = f", {_words(left)}" if left is not None and done < total else ""
         print(f"{phase}{counted}{ending}", file=sys.stderr, flush=True)
+
+
+class _TimeLeft(ProgressColumn):
+    """The time left, where the task knows it."""
+
+    def render(self, task: Task) -> Text:
+        """The words beside the bar."""
+        left = task.fields.get("left")
+        return Text("" if left is None else _words(left))
 
 
 class _Bar:
@@ -39,15 +74,18 @@ class _Bar:
 
     def __init__(self, bar: Progress) -> None:
         self._bar = bar
-        self._task = bar.add_task("")
-        self._phase = ""
+        self._task = bar.add_task("starting", total=None)
+        self._pace = _Pace()
 
     def __call__(self, phase: str, done: int, total: int) -> None:
-        if phase != self._phase:
-            self._phase = phase
-            self._bar.reset(self._task, total=total)
         counted = f"frame {done} of {total}" if done else f"{total} frames"
-        self._bar.update(self._task, completed=done, description=f"{phase}  {counted}")
+        self._bar.update(
+            self._task,
+            completed=done,
+            total=total if done else None,
+            description=f"{phase}  {counted}",
+            left=self._pace.left(done, total),
+        )
 
 
 @contextmanager
@@ -57,8 +95,7 @@ def shown_progress(quiet: bool) -> Iterator[_Lines | _Bar | None]:
     if quiet:
         yield None
     elif console.is_terminal:
-        left = TextColumn("left")
-        columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), left
+        columns = TextColumn("{task.description}"), BarColumn(), _TimeLeft()
         with Progress(*columns, console=console, transient=True) as bar:
             yield _Bar(bar)
     else:

@@ -23,6 +23,9 @@ from particlesim.motion import move, particle_spin, path_of, spin_of
 from particlesim.narrow_phase.contacts import contact_between, contact_now
 from particlesim.vec import add, along, cross, dot, norm, put, row, row4, scaled, sub
 
+# Trials of the root finder, which needs about ten; rounding of the separation could keep it busy for ever.
+_MAX_TRIES = 100
+
 # Two that meet twice within a step are looked for apart in between down to this power of a half of the step.
 _HALVINGS = 24
 
@@ -195,7 +198,9 @@ def _time_since_impact(table, world, constants, state, clock, i, j, points):
         return 0.0
     gap = outside
     side = 0
-    while gap > tolerance:
+    for _ in range(_MAX_TRIES):
+        if gap <= tolerance:
+            break
         # Aim between nothing and the tolerance, so that the end kept is the one where they are apart.
         middle = late + (early - late) * (inside - 0.5 * tolerance) / (inside - outside)
         if not late < middle < early:

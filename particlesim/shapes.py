@@ -9,14 +9,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.optimize import nnls
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
 from particlesim.constants import HULL, SPHERE
 from particlesim.mass_properties import mass_properties, principal_axes
 
-# Triangles of a hull whose normals differ by less than this angle [rad] are one face of it.
-_COPLANAR = 1e-6
+# Mesh files hold float32 or six digits: what is smaller than this fraction of the shape is rounding.  A vertex that
+# stands out by less is none, triangles that leave the plane of a larger neighbour by less are one face with it.
+_ROUNDING = 1e-6
+
+# Triangles steeper than this against each other [rad] are two faces, however thin the shape.
+_SAME_FACE = 0.1
+
+# Corners may lie this far off the plane of their face, as a fraction of the shape: rounding.
+_FLAT = 1e-14
 
 # An exact test of two hulls looks at every pair of their edges; a mesh of more corners than this is thinned.
 MAX_MESH_VERTICES = 96
@@ -74,11 +82,18 @@ def sphere() -> Shape:
 
 
 def hull(name: str, vertices: Any) -> Shape:
-    """The convex hull of ``vertices`` (v, 3) as a shape about its centroid. ValueError if it encloses no volume."""
+    """The convex hull of ``vertices`` (v, 3) as a shape about its centroid.
+
+    Vertices inside the hull, its faces or its edges are dropped; triangles in one plane within 1e-6 of the shape's
+    extent become one face, and its corners are moved into the plane.
+    ValueError if the vertices are not finite or enclose no volume.
+    """
     points = np.asarray(vertices, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
         raise ValueError(f"the vertices of '{name}' must be rows of three finite numbers")
+    points = _corners(name, points)
     corners, faces = _polygons(points, _convex_hull(name, points))
+    corners = _flattened(name, corners, faces)
     volume, centroid, inertia = mass_properties(corners, faces)
     moments, axes = principal_axes(inertia)
     body = np.ascontiguousarray((corners - centroid) @ axes)
@@ -162,27 +177,62 @@ def _loop_normal(loop: np.ndarray) -> np.ndarray:
     return normal / np.linalg.norm(normal)
 
 
+def _corners(name: str, points: np.ndarray) -> np.ndarray:
+    """The points that stand out from the hull of the others, by more than rounding."""
+    while True:
+        convex = _convex_hull(name, points)
+        near = _ROUNDING * np.linalg.norm(np.ptp(points, axis=0))
+        dropped: set[int] = set()
+        for v in convex.vertices.tolist():
+            ring = np.unique(convex.simplices[(convex.simplices == v).any(axis=1)])
+            ring = ring[ring != v]
+            if dropped.isdisjoint(ring.tolist()) and _distance_from_hull(points[v], points[ring]) < near:
+                dropped.add(v)
+        points = points[[v for v in convex.vertices if v not in dropped]]
+        if not dropped:
+            return points
+
+
+def _distance_from_hull(point: np.ndarray, others: np.ndarray) -> float:
+    """Distance of a point from the convex hull of others near it, which may be flat."""
+    arms = others - point
+    scale = np.abs(arms).max()
+    # Weights of the others that are not negative, sum to 1 and make the point.
+    _, off = nnls(np.vstack([arms.T / scale, np.ones(len(arms))]), np.array([0.0, 0.0, 0.0, 1.0]))
+    return scale * off
+
+
 def _polygons(points: np.ndarray, convex: ConvexHull) -> tuple[np.ndarray, tuple[tuple[int, ...], ...]]:
-    """Corners and faces of a hull: its coplanar triangles joined, corners inside a face or an edge dropped."""
+    """Corners and faces of a hull: its coplanar triangles joined, vertices inside a face or an edge dropped."""
     normals = convex.equations[:, :3]
+    a, b, c = (points[convex.simplices[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    near = _ROUNDING * np.linalg.norm(np.ptp(points, axis=0))
     face_of = np.full(len(normals), -1)
-    for seed in range(len(normals)):
-        if face_of[seed] < 0:
-            face_of[seed] = seed
-            reach = [seed]
-            while reach:
-                for other in convex.neighbors[reach.pop()]:
-                    flat = np.linalg.norm(normals[other] - normals[seed]) < _COPLANAR
-                    if face_of[other] < 0 and flat:
-                        face_of[other] = seed
-                        reach.append(other)
+    # The largest first: the normal of a sliver is uncertain.
+    for seed in np.argsort(-area, kind="stable"):
+        if face_of[seed] >= 0:
+            continue
+        height = np.abs((points - points[convex.simplices[seed, 0]]) @ normals[seed])
+        flat = (height[convex.simplices] < near).all(axis=1)
+        flat &= np.linalg.norm(normals - normals[seed], axis=1) < _SAME_FACE
+        face_of[seed] = seed
+        reach = [seed]
+        while reach:
+            for other in convex.neighbors[reach.pop()]:
+                if face_of[other] < 0 and flat[other]:
+                    face_of[other] = seed
+                    reach.append(other)
+    meets = np.zeros((len(points), len(normals)), dtype=bool)
+    meets[convex.simplices, face_of[:, None]] = True
+    # A corner is where three faces meet: two meet along an edge.
+    corner = meets.sum(axis=1) >= 3
+    number = np.cumsum(corner) - 1
     loops = []
     for seed in np.unique(face_of):
-        members = np.unique(convex.simplices[face_of == seed])
-        loops.append(members[_outline(points[members], normals[seed])])
-    corners = np.unique(np.concatenate(loops))
-    number = {int(old): new for new, old in enumerate(corners)}
-    return points[corners], tuple(tuple(number[int(v)] for v in loop) for loop in loops)
+        members = np.flatnonzero(meets[:, seed] & corner)
+        loops.append(number[members[_outline(points[members], normals[seed])]])
+    return points[corner], tuple(tuple(loop.tolist()) for loop in loops)
 
 
 def _outline(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -191,6 +241,39 @@ def _outline(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
     u = arm[np.argmax(np.linalg.norm(arm, axis=1))]
     v = np.cross(normal, u)
     return np.argsort(np.arctan2(arm @ v, arm @ u))
+
+
+def _flattened(name: str, corners: np.ndarray, faces: tuple[tuple[int, ...], ...]) -> np.ndarray:
+    """Corners moved as little as possible so that those of each face lie in one plane.
+
+    Newton's method on normal . corner = offset for every corner of every face that is not a triangle, in the least
+    change of corners, normals and offsets: corners that are off by 1e-6 are in their planes after two steps.
+    """
+    loops = [list(loop) for loop in faces if len(loop) > 3]
+    centre, scale = corners.mean(axis=0), np.ptp(corners, axis=0).max()
+    x = (corners - centre) / scale
+    normals = np.array([_loop_normal(x[loop]) for loop in loops]).reshape(-1, 3)
+    offsets = np.array([(x[loop] @ n).mean() for loop, n in zip(loops, normals, strict=True)])
+    face = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])
+    corner = np.array([v for loop in loops for v in loop], dtype=np.int64)
+    rows, first, last = np.arange(len(corner)), x.size, x.size + normals.size
+    for _ in range(8):
+        off = np.einsum("ij,ij->i", normals[face], x[corner]) - offsets[face]
+        if np.abs(off).max(initial=0.0) <= _FLAT:
+            break
+        system = np.zeros((len(rows) + len(loops), last + len(loops)))
+        for axis in range(3):
+            system[rows, 3 * corner + axis] = normals[face, axis]
+            system[rows, first + 3 * face + axis] = x[corner, axis]
+            system[len(rows) + np.arange(len(loops)), first + 3 * np.arange(len(loops)) + axis] = normals[:, axis]
+        system[rows, last + face] = -1.0
+        change = np.linalg.lstsq(system, np.concatenate([-off, np.zeros(len(loops))]), rcond=None)[0]
+        x = x + change[:first].reshape(-1, 3)
+        normals = normals + change[first:last].reshape(-1, 3)
+        offsets = offsets + change[last:]
+    else:
+        raise ValueError(f"the faces of '{name}' cannot be made plane")
+    return x * scale + centre if loops else corners
 
 
 def _spread(points: np.ndarray) -> np.ndarray:

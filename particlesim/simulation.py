@@ -5,13 +5,12 @@ from __future__ import annotations
 import hashlib
 import math
 
-import numba
 import numpy as np
 
 from particlesim.broad_phase import METHODS
 from particlesim.build import build
 from particlesim.constants import MAX_ROUNDS
-from particlesim.crew import Crew
+from particlesim.crew import Crew, use_threads
 from particlesim.ledger import Ledger, sums
 from particlesim.motion import advance, longest_step, spins
 from particlesim.narrow_phase.contacts import deepest_overlap, touching_pairs, touching_walls
@@ -28,11 +27,13 @@ class SimulationError(RuntimeError):
 class Simulation:
     """A scene in motion.
 
-    ``broad_phase`` overrides the scene's: "naive", "grid" or "octree"; ``threads`` is how many numba may use (all if
-    None). Neither changes the result by a bit. SceneError if the scene cannot be built.
+    ``broad_phase`` overrides the scene's: "naive", "grid" or "octree"; ``threads`` is how many it may use (one a
+    processor if None). Neither changes the result by a bit. SceneError if the scene cannot be built.
     """
 
     def __init__(self, scene: Scene, broad_phase: str | None = None, threads: int | None = None) -> None:
+        use_threads(threads)
+        self._threads = threads
         self.scene = scene
         self.shapes, self.table, self.world, self.constants, self.state = build(scene)
         chosen = scene.solver.broad_phase
@@ -40,7 +41,6 @@ class Simulation:
             raise ValueError(f"unknown broad phase '{broad_phase}'; there are {', '.join(METHODS)}")
         self._find_pairs = METHODS[broad_phase or chosen.kind]
         self._parameters = chosen.model_dump(exclude={"kind"}) if broad_phase in (None, chosen.kind) else {}
-        self._threads = threads
         self._frame_time = 1.0 / scene.movie.fps
         n = len(self.constants.mass)
         self._lower, self._upper = np.empty((n, 3)), np.empty((n, 3))
@@ -81,8 +81,7 @@ class Simulation:
 
     def step(self, time_step: float | None = None) -> None:
         """One time step [s], the automatic one if not given."""
-        if self._threads is not None:
-            numba.set_num_threads(self._threads)
+        use_threads(self._threads)
         self.time_step = self.next_time_step() if time_step is None else time_step
         self._advance(self.time_step)
         self._respond()

@@ -6,11 +6,9 @@ import math
 
 import numpy as np
 
+from particlesim.build import BYTES_PER_PARTICLE
 from particlesim.scene import Scene
 from particlesim.simulation import Simulation
-
-# Bytes a particle: constants, state, boxes, and what the broad phase and the candidate pairs take at their largest.
-_BYTES_PER_PARTICLE = 1000
 
 # Bytes of the process before any particle: interpreter, numpy, numba, compiled kernels, OpenGL.
 _BYTES_OF_PROCESS = 400e6
@@ -47,5 +45,5 @@ def survey(scene: Scene) -> list[tuple[str, str]]:
         ("time step", f"{step:.3g} s ({chosen}), about {math.ceil(scene.duration / step):,} steps"),
         ("duration", f"{scene.duration:g} s"),
         ("frames", f"{scene.frames:,} of {width} x {height} at {scene.movie.fps:g} a second"),
-        ("memory", f"about {(_BYTES_OF_PROCESS + _BYTES_PER_PARTICLE * len(c.size) + 30 * pixels) / 1e6:,.0f} MB"),
+        ("memory", f"about {(_BYTES_OF_PROCESS + BYTES_PER_PARTICLE * len(c.size) + 30 * pixels) / 1e6:,.0f} MB"),
     ]

@@ -108,7 +108,7 @@ class TrajectoryWriter:
             particles.typeid = self._type_of.astype(np.uint32)
             particles.mass = header.mass.astype(np.float32)
             particles.moment_inertia = header.inertia.astype(np.float32)
-            particles.diameter = header.size.astype(np.float32)
+            particles.diameter = _display_diameters(header)
             out.log.update(_header_log(header))
         out.log[_LOG + "time"] = np.array([frame.time])
         for name, value in frame.ledger.items():
@@ -182,6 +182,12 @@ def _display_types(header: Header) -> tuple[list[tuple[str, dict[str, Any]]], np
             type_of[members[rank]] = len(types)
             types.append((f"{shape.name}_{group}_{len(types)}", _gsd_shape(shape, size)))
     return types, type_of
+
+
+def _display_diameters(header: Header) -> np.ndarray:
+    """Diameters of spheres, (n,) float32 [m], and 2 for hulls, whose vertices OVITO stretches by half of it."""
+    spheres = np.array([shape.kind == SPHERE for shape in header.shapes])[header.shape]
+    return np.where(spheres, header.size, 2.0).astype(np.float32)
 
 
 def _size_classes(size: np.ndarray) -> list[np.ndarray]:

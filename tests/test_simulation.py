@@ -29,7 +29,7 @@ def test_the_number_of_threads_changes_no_bit():
     packed = {"shape": "cube", "count": 17000, "size": 0.8, "velocity": {"kind": "uniform", "speed": 1.0}}
     crowd = scene(packed | {"placement": {"kind": "lattice", "spacing": 1.45}}, size=(40, 40, 40))
     hashes = set()
-    for threads in (1, 2):
+    for threads in (1, 2, 4):
         sim = Simulation(crowd, threads=threads)
         sim.run(steps=3)
         hashes.add(sim.state_hash())

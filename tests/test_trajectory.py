@@ -51,6 +51,7 @@ def test_other_programs_find_the_hoomd_schema(run):
     assert shapes[0] == {"type": "Sphere", "diameter": pytest.approx(0.3)}
     assert shapes[5]["type"] == "ConvexPolyhedron"
     assert np.allclose(np.abs(shapes[5]["vertices"]), 0.15)
+    assert particles.diameter[[0, 5]].tolist() == pytest.approx([0.3, 2.0])
     assert np.allclose(particles.mass, sim.constants.mass, rtol=1e-6)
     # HOOMD's angular momentum is 2 q (0, L_body).
     q, p = particles.orientation[7], particles.angmom[7]

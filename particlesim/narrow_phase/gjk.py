@@ -1,33 +1,35 @@
 """Distance between two convex hulls: the algorithm of Gilbert, Johnson and Keerthi.
 
-E. G. Gilbert, D. W. Johnson, S. S. Keerthi, IEEE Journal of Robotics and Automation 4 (1988) 193-203. The nearest
-point of the simplex is the best over all of its corners, edges, triangles and its inside. That is Johnson's
-fallback rather than his recursion: a few more flops, and no answer that lies outside the simplex, however thin it is.
+E. G. Gilbert, D. W. Johnson, S. S. Keerthi, IEEE Journal of Robotics and Automation 4 (1988) 193-203. It walks a
+simplex of up to four corners of the difference body B - A towards the origin. The nearest point of the simplex is
+the best over all of its parts that hold the newest corner: a few more flops than Johnson's recursion, and no answer
+that lies outside the simplex, however thin it is. The vector to that point is made perpendicular to its part by
+construction, not by subtraction of nearly equal points: hulls that all but touch keep their distance and normal.
 """
 
 import math
 
-import numpy as np
-
 from particlesim.jit import kernel
-from particlesim.vec import add, apply, apply_transposed, cross, dot, norm, put, row, scaled, sub
+from particlesim.vec import add, along, apply, apply_transposed, cross, dot, norm, row, scaled, sub
 
 # The search ends when a corner of the difference body can be nearer than the simplex by no more than this fraction.
 _GAP = 1e-15
 
-# Hulls nearer than this fraction of their sizes count as touching here; the separating axis test takes over.
-TOUCHING = 1e-10
-
-# Every step shortens the distance, so hulls of MAX_MESH_VERTICES never come near this bound.
+# Every step shortens the distance or turns the direction.  Hulls of MAX_MESH_VERTICES take some 30 steps at the most.
 _MAX_STEPS = 256
+
+# Steps that only turn the direction, the distance being shortened by less than rounding: more go round in circles.
+_MAX_IDLE = 8
+
+# How uncertain a distance is by its own length, as a fraction: some units in the last place.
+_ROUNDING = 1e-14
+
+_ORIGIN = (0.0, 0.0, 0.0)
 
 
 @kernel
-def support(vertices, size, matrix, direction):
-    """The vertex of a hull farthest along ``direction``, relative to its centroid, in world axes.
-
-    ``vertices`` (v, 3) are those of size 1 in body axes.
-    """
+def _support(vertices, matrix, direction):
+    """The number of the vertex of a hull farthest along ``direction``; vertices (v, 3) in body axes."""
     local = apply_transposed(matrix, direction)
     best = 0
     farthest = -math.inf
@@ -36,143 +38,160 @@ def support(vertices, size, matrix, direction):
         if reach > farthest:
             farthest = reach
             best = v
-    return apply(matrix, scaled(row(vertices, best), size))
+    return best
 
 
 @kernel
-def _weigh_segment(a, b):
-    """Weight of b in the point of the line ab nearest to the origin; negative if none is wanted."""
-    e = sub(b, a)
+def _vertex(vertices, size, matrix, v):
+    """Vertex ``v`` of a hull relative to its centroid, in world axes."""
+    return apply(matrix, scaled(row(vertices, v), size))
+
+
+@kernel
+def _nearest_on_segment(p, a):
+    """Weight of a, and the nearest point to the origin of the line pa; the weight is negative if there is none."""
+    e = sub(a, p)
     length2 = dot(e, e)
-    return -dot(a, e) / length2 if length2 > 0.0 else -1.0
+    if length2 <= 0.0:
+        return -1.0, _ORIGIN
+    return -dot(p, e) / length2, scaled(cross(e, cross(p, e)), 1.0 / length2)
 
 
 @kernel
-def _weigh_triangle(a, b, c):
-    """Weights of b and c in the point of the plane abc nearest to the origin."""
-    e, f = sub(b, a), sub(c, a)
+def _nearest_on_triangle(p, a, b):
+    """Weights of a and b, and the nearest point to the origin of the plane pab; negative weights if there is none."""
+    e, f = sub(a, p), sub(b, p)
     n = cross(e, f)
     area2 = dot(n, n)
     if area2 <= 0.0:
-        return -1.0, -1.0
-    return dot(cross(f, a), n) / area2, dot(cross(a, e), n) / area2
+        return -1.0, -1.0, _ORIGIN
+    # The normal of a sliver is uncertain across it, where it is narrow: only that part of p may meet the error.
+    longer = e if dot(e, e) > dot(f, f) else f
+    across = along(p, longer, -dot(p, longer) / dot(longer, longer))
+    return dot(cross(f, p), n) / area2, dot(cross(p, e), n) / area2, scaled(n, dot(across, n) / area2)
 
 
 @kernel
-def _weigh_tetrahedron(a, b, c, d):
-    """Weights of b, c and d that make the origin of a tetrahedron's corners."""
-    e, f, g = sub(b, a), sub(c, a), sub(d, a)
+def _weigh_tetrahedron(p, a, b, c):
+    """Weights of a, b and c that make the origin of a tetrahedron's corners; negative if it is flat."""
+    e, f, g = sub(a, p), sub(b, p), sub(c, p)
     volume = dot(e, cross(f, g))
     if volume == 0.0:
         return -1.0, -1.0, -1.0
-    return -dot(a, cross(f, g)) / volume, -dot(a, cross(g, e)) / volume, -dot(a, cross(e, f)) / volume
+    return -dot(p, cross(f, g)) / volume, -dot(p, cross(g, e)) / volume, -dot(p, cross(e, f)) / volume
 
 
 @kernel
-def _try_part(corners, part, weights, nearest, best_weights, best):
-    """Keep the point that ``weights`` make of the corners in ``part`` if it is nearer than the best so far."""
-    x = y = z = 0.0
-    for k in range(4):
-        if weights[k] < 0.0:
-            return best
-        x += weights[k] * corners[part[k], 0]
-        y += weights[k] * corners[part[k], 1]
-        z += weights[k] * corners[part[k], 2]
-    distance2 = x * x + y * y + z * z
-    if distance2 < best:
-        for k in range(4):
-            best_weights[k] = 0.0
-        for k in range(4):
-            best_weights[part[k]] += weights[k]
-        put(nearest, 0, (x, y, z))
-        return distance2
-    return best
+def _nearest_of_simplex(simplex, newest):
+    """The nearest point to the origin of the parts of a simplex that hold corner ``newest``, its last.
+
+    Returns (squared distance, nearest point, number of corners of its part, which corners, their weights).
+    """
+    p = simplex[newest]
+    best, nearest, count, part, weights = dot(p, p), p, 1, (newest, 0, 0, 0), (1.0, 0.0, 0.0, 0.0)
+    for i in range(newest):
+        t, v = _nearest_on_segment(p, simplex[i])
+        if 0.0 <= t <= 1.0 and dot(v, v) < best:
+            best, nearest, count = dot(v, v), v, 2
+            part, weights = (newest, i, 0, 0), (1.0 - t, t, 0.0, 0.0)
+        for j in range(i + 1, newest):
+            t, u, v = _nearest_on_triangle(p, simplex[i], simplex[j])
+            if t >= 0.0 and u >= 0.0 and t + u <= 1.0 and dot(v, v) < best:
+                best, nearest, count = dot(v, v), v, 3
+                part, weights = (newest, i, j, 0), (1.0 - t - u, t, u, 0.0)
+    if newest == 3:
+        t, u, s = _weigh_tetrahedron(p, simplex[0], simplex[1], simplex[2])
+        if t >= 0.0 and u >= 0.0 and s >= 0.0 and t + u + s <= 1.0:
+            best, nearest, count = 0.0, _ORIGIN, 4
+            part, weights = (newest, 0, 1, 2), (1.0 - t - u - s, t, u, s)
+    return best, nearest, count, part, weights
 
 
 @kernel
-def _nearest_of_simplex(corners, count, best_weights, nearest):
-    """Weights of the point of a simplex nearest to the origin; the point is written to ``nearest[0]``."""
-    best = math.inf
-    for i in range(count):
-        best = _try_part(corners, (i, i, i, i), (1.0, 0.0, 0.0, 0.0), nearest, best_weights, best)
-        for j in range(i + 1, count):
-            t = _weigh_segment(row(corners, i), row(corners, j))
-            best = _try_part(corners, (i, j, j, j), (1.0 - t, t, 0.0, 0.0), nearest, best_weights, best)
-            for k in range(j + 1, count):
-                t, u = _weigh_triangle(row(corners, i), row(corners, j), row(corners, k))
-                best = _try_part(corners, (i, j, k, k), (1.0 - t - u, t, u, 0.0), nearest, best_weights, best)
-    if count == 4:
-        t, u, v = _weigh_tetrahedron(row(corners, 0), row(corners, 1), row(corners, 2), row(corners, 3))
-        best = _try_part(corners, (0, 1, 2, 3), (1.0 - t - u - v, t, u, v), nearest, best_weights, best)
-    return best
+def _chosen(four, part):
+    """Four things in the order of the numbers in ``part``."""
+    return four[part[0]], four[part[1]], four[part[2]], four[part[3]]
 
 
 @kernel
-def _drop_unused(corners, of_a, of_b, weights, count):
-    """Move the corners that carry weight to the front; returns how many there are."""
-    kept = 0
+def _replaced(four, k, new):
+    """Four things of which number ``k`` is new."""
+    return (
+        new if k == 0 else four[0],
+        new if k == 1 else four[1],
+        new if k == 2 else four[2],
+        new if k == 3 else four[3],
+    )
+
+
+@kernel
+def _holds(picks_a, picks_b, count, a, b):
+    """Whether the first ``count`` corners hold the difference of vertices a and b."""
+    found = False
     for k in range(count):
-        if weights[k] > 0.0:
-            weights[kept] = weights[k]
-            put(corners, kept, row(corners, k))
-            put(of_a, kept, row(of_a, k))
-            put(of_b, kept, row(of_b, k))
-            kept += 1
-    return kept
+        found = found or (picks_a[k] == a and picks_b[k] == b)
+    return found
 
 
 @kernel
-def apart_along(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, direction):
-    """How far hull b, centred at ``offset`` from hull a, lies beyond it along ``direction``, times its length."""
-    a = support(vertices_a, size_a, matrix_a, direction)
-    b = add(offset, support(vertices_b, size_b, matrix_b, scaled(direction, -1.0)))
-    return dot(direction, sub(b, a))
+def _weighted(vertices, size, matrix, picks, weights, count):
+    """The point that ``weights`` make of ``count`` vertices of a hull, relative to its centroid."""
+    point = _ORIGIN
+    for k in range(count):
+        point = along(point, _vertex(vertices, size, matrix, picks[k]), weights[k])
+    return point
+
+
+@kernel
+def hulls_apart(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching):
+    """Whether hull b, centred at ``offset`` from hull a, is farther from it than ``touching`` [m]."""
+    length, _, _, _ = hull_distance(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching, True)
+    return length > touching
 
 
 @kernel
 def hull_distance(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching, only_whether):
     """Distance of hull b, centred at ``offset`` from hull a, and the nearest points relative to a's centroid.
 
-    Returns (distance, point of a, point of b); distance 0 means that they overlap or are nearer than ``touching``.
-    With ``only_whether`` any positive number may stand for the distance of hulls that are apart: the first
-    separating direction ends the search.
+    Returns (distance, direction from a to b, point of a, point of b). The direction, of any length, is the one along
+    which they are proven to be that far apart: near contact it is more certain than the difference of the points.
+    The distance is 0 if they overlap, are nearer than ``touching`` [m], or if rounding ended the search farther than
+    that from a proof of the distance. With ``only_whether`` any number above ``touching`` may stand for the distance
+    of hulls that are apart: the first separating direction ends the search.
     """
-    corners, of_a, of_b = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
-    weights = np.empty(4)
-    nearest = np.empty((1, 3))
-
+    simplex = (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)
+    picks_a = picks_b = (-1, -1, -1, -1)
+    weights = (1.0, 0.0, 0.0, 0.0)
     v = offset if norm(offset) > 0.0 else (1.0, 0.0, 0.0)
-    length2 = math.inf
-    count = 0
+    apart = v
+    length, at_least = math.inf, -math.inf
+    count = idle = 0
     for _ in range(_MAX_STEPS):
-        a = support(vertices_a, size_a, matrix_a, v)
-        b = add(offset, support(vertices_b, size_b, matrix_b, scaled(v, -1.0)))
-        w = sub(b, a)
-        gain = dot(v, w)
-        if only_whether and gain > touching * norm(v):
-            return gain, a, b
-        if count > 0 and length2 - gain <= _GAP * length2:
+        a = _support(vertices_a, matrix_a, v)
+        b = _support(vertices_b, matrix_b, scaled(v, -1.0))
+        w = sub(add(offset, _vertex(vertices_b, size_b, matrix_b, b)), _vertex(vertices_a, size_a, matrix_a, a))
+        bound = dot(v, w) / norm(v)
+        if bound > at_least:
+            at_least, apart = bound, v
+        if only_whether and at_least > touching:
+            return at_least, v, _ORIGIN, _ORIGIN
+        if count > 0 and length - at_least <= _GAP * length:
             break
-        seen = False
-        for k in range(count):
-            seen = seen or (w[0] == corners[k, 0] and w[1] == corners[k, 1] and w[2] == corners[k, 2])
-        if seen:
+        if _holds(picks_a, picks_b, count, a, b):
             break
-        put(corners, count, w)
-        put(of_a, count, a)
-        put(of_b, count, b)
-        count += 1
-        shorter2 = _nearest_of_simplex(corners, count, weights, nearest)
-        count = _drop_unused(corners, of_a, of_b, weights, count)
-        stalled = shorter2 >= length2
-        length2 = shorter2
-        v = row(nearest, 0)
-        if stalled or length2 <= touching * touching:
+        simplex = _replaced(simplex, count, w)
+        picks_a, picks_b = _replaced(picks_a, count, a), _replaced(picks_b, count, b)
+        shorter2, nearest, found, part, of_part = _nearest_of_simplex(simplex, count)
+        shorter = math.sqrt(shorter2)
+        idle += shorter >= length
+        if shorter > length + touching + _ROUNDING * length or idle > _MAX_IDLE:
             break
-
-    point_a = point_b = (0.0, 0.0, 0.0)
-    for k in range(count):
-        point_a = add(point_a, scaled(row(of_a, k), weights[k]))
-        point_b = add(point_b, scaled(row(of_b, k), weights[k]))
-    distance = math.sqrt(length2)
-    return (distance if distance > touching else 0.0), point_a, point_b
+        simplex, picks_a, picks_b = _chosen(simplex, part), _chosen(picks_a, part), _chosen(picks_b, part)
+        length, v, count, weights = shorter, nearest, found, of_part
+        if length <= touching:
+            break
+    if only_whether or length <= touching or length - at_least > touching + _ROUNDING * length:
+        length = 0.0
+    point_a = _weighted(vertices_a, size_a, matrix_a, picks_a, weights, count)
+    point_b = add(offset, _weighted(vertices_b, size_b, matrix_b, picks_b, weights, count))
+    return length, apart, point_a, point_b

@@ -1,10 +1,16 @@
 """Hull against hull: exact distance outside, exact depth inside, and the contact patch."""
 
 from particlesim.jit import kernel
-from particlesim.narrow_phase.gjk import TOUCHING, apart_along, hull_distance
+from particlesim.narrow_phase.gjk import hull_distance, hulls_apart
 from particlesim.narrow_phase.manifold import hull_patch
 from particlesim.narrow_phase.separating_axis import hull_depth
-from particlesim.vec import add, matrix_of, norm, scaled, sub
+from particlesim.vec import add, matrix_of, norm, scaled
+
+# Hulls nearer than this fraction of their sizes count as touching.
+_TOUCHING = 1e-10
+
+# Nearer than this fraction of their sizes, the distance is rounding; the separating axis test takes over.
+_JOINED = 1e-13
 
 
 @kernel(inline=True)
@@ -13,33 +19,28 @@ def _vertices(table, shape):
     return table.vertex[table.vertex_start[shape] : table.vertex_start[shape + 1]]
 
 
-@kernel
-def _apart(vertices_a, size_a, turn_a, vertices_b, size_b, turn_b, offset, touching):
-    """Whether two hulls are farther apart than ``touching``."""
-    matrix_a, matrix_b = matrix_of(turn_a), matrix_of(turn_b)
-    # The line of centres separates most pairs, at a fraction of the cost of the whole search.
-    gap = apart_along(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, offset)
-    if gap > touching * norm(offset):
-        return True
-    distance, _, _ = hull_distance(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching, True)
-    return distance > 0.0
-
-
 @kernel(inline=True)
 def hulls_overlap(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset):
     """Whether two hulls touch or overlap."""
-    touching = TOUCHING * (table.radius[shape_a] * size_a + table.radius[shape_b] * size_b)
-    return not _apart(
-        _vertices(table, shape_a), size_a, turn_a, _vertices(table, shape_b), size_b, turn_b, offset, touching
+    touching = _TOUCHING * (table.radius[shape_a] * size_a + table.radius[shape_b] * size_b)
+    return not hulls_apart(
+        _vertices(table, shape_a),
+        size_a,
+        matrix_of(turn_a),
+        _vertices(table, shape_b),
+        size_b,
+        matrix_of(turn_b),
+        offset,
+        touching,
     )
 
 
-@kernel
+@kernel(inline=True)
 def hull_hull(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
     """Separation, normal from a to b and number of contact points of hull b at ``offset`` from hull a."""
     matrix_a, matrix_b = matrix_of(turn_a), matrix_of(turn_b)
-    touching = TOUCHING * (table.radius[shape_a] * size_a + table.radius[shape_b] * size_b)
-    separation, point_a, point_b = hull_distance(
+    joined = _JOINED * (table.radius[shape_a] * size_a + table.radius[shape_b] * size_b)
+    separation, apart, point_a, point_b = hull_distance(
         _vertices(table, shape_a),
         size_a,
         matrix_a,
@@ -47,11 +48,11 @@ def hull_hull(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, p
         size_b,
         matrix_b,
         offset,
-        touching,
+        joined,
         False,
     )
     if separation > 0.0:
-        normal = scaled(sub(point_b, point_a), 1.0 / separation)
+        normal = scaled(apart, 1.0 / norm(apart))
     else:
         separation, normal = hull_depth(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset)
     middle = scaled(add(point_a, point_b), 0.5)

@@ -4,44 +4,59 @@ import math
 
 import numpy as np
 
-from particlesim.constants import MAX_MANIFOLD, PARALLEL_TOLERANCE, PATCH_TOLERANCE
+from particlesim.constants import MAX_MANIFOLD, PARALLEL_TOLERANCE
 from particlesim.jit import kernel
 from particlesim.shapes import MAX_MESH_VERTICES
 from particlesim.vec import add, along, apply, apply_transposed, cross, dot, norm, put, row, scaled, sub
 
 # A polygon clipped by a polygon has at most the corners of both.
-_MAX_CORNERS = 2 * MAX_MESH_VERTICES
+MAX_CORNERS = 2 * MAX_MESH_VERTICES
 
 # Corners this far outside a face, as a fraction of its size, still lie on it: rounding, and edges that coincide.
 _ON_EDGE = 1e-9
 
 
 @kernel
-def _facing_feature(table, shape, size, matrix, offset, direction, feature):
-    """Write the face, edge or vertex of a hull that faces ``direction``; returns (corners, whether it is a face)."""
+def _flattest_edge(edge, first, last, vertices, corner, direction):
+    """The other end of the edge at ``corner`` that runs across ``direction``, within PARALLEL_TOLERANCE; -1 if none."""
+    other, least = -1, PARALLEL_TOLERANCE
+    for e in range(first, last):
+        if edge[e, 0] == corner or edge[e, 1] == corner:
+            end = edge[e, 0] + edge[e, 1] - corner
+            span = sub(row(vertices, end), row(vertices, corner))
+            slope = abs(dot(span, direction)) / norm(span)
+            if slope < least:
+                other, least = end, slope
+    return other
+
+
+@kernel
+def facing_feature(table, shape, size, matrix, offset, direction, feature):
+    """Write the face, edge or vertex of a hull that faces ``direction``; returns (corners, whether it is a face).
+
+    ``feature`` is (MAX_CORNERS, 3); ``offset`` is the hull's centroid.
+    """
     local = apply_transposed(matrix, direction)
-    start = table.vertex_start[shape]
+    # Taken out of their struct once: each access counts references, which costs more than the arithmetic.
+    face_normal, loop, loop_start = table.face_normal, table.loop, table.loop_start
+    vertices = table.vertex[table.vertex_start[shape] : table.vertex_start[shape + 1]]
     for f in range(table.face_start[shape], table.face_start[shape + 1]):
-        n = row(table.face_normal, f)
+        n = row(face_normal, f)
         if dot(n, local) > 0.0 and norm(cross(n, local)) < PARALLEL_TOLERANCE:
-            first, last = table.loop_start[f], table.loop_start[f + 1]
+            first, last = loop_start[f], loop_start[f + 1]
             for k in range(first, last):
-                v = row(table.vertex, start + table.loop[k])
-                put(feature, k - first, add(offset, apply(matrix, scaled(v, size))))
+                put(feature, k - first, add(offset, apply(matrix, scaled(row(vertices, loop[k]), size))))
             return last - first, True
-    best, second = start, start
-    reach, second_reach = -math.inf, -math.inf
-    for v in range(start, table.vertex_start[shape + 1]):
-        r = dot(row(table.vertex, v), local)
+    best, reach = 0, -math.inf
+    for v in range(len(vertices)):
+        r = dot(row(vertices, v), local)
         if r > reach:
-            second, second_reach = best, reach
             best, reach = v, r
-        elif r > second_reach:
-            second, second_reach = v, r
-    put(feature, 0, add(offset, apply(matrix, scaled(row(table.vertex, best), size))))
-    if second_reach < reach - PATCH_TOLERANCE * table.radius[shape]:
+    put(feature, 0, add(offset, apply(matrix, scaled(row(vertices, best), size))))
+    other = _flattest_edge(table.edge, table.edge_start[shape], table.edge_start[shape + 1], vertices, best, local)
+    if other < 0:
         return 1, False
-    put(feature, 1, add(offset, apply(matrix, scaled(row(table.vertex, second), size))))
+    put(feature, 1, add(offset, apply(matrix, scaled(row(vertices, other), size))))
     return 2, False
 
 
@@ -102,11 +117,11 @@ def hull_patch(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offs
     ``normal`` points from a to b. ``middle`` stands in where features that are parallel only within the tolerance
     share no point. ``points`` is (MAX_MANIFOLD, 3).
     """
-    of_a, of_b = np.empty((_MAX_CORNERS, 3)), np.empty((_MAX_CORNERS, 3))
-    spare = np.empty((_MAX_CORNERS, 3))
+    of_a, of_b = np.empty((MAX_CORNERS, 3)), np.empty((MAX_CORNERS, 3))
+    spare = np.empty((MAX_CORNERS, 3))
     back = scaled(normal, -1.0)
-    count_a, face_a = _facing_feature(table, shape_a, size_a, matrix_a, (0.0, 0.0, 0.0), normal, of_a)
-    count_b, face_b = _facing_feature(table, shape_b, size_b, matrix_b, offset, back, of_b)
+    count_a, face_a = facing_feature(table, shape_a, size_a, matrix_a, (0.0, 0.0, 0.0), normal, of_a)
+    count_b, face_b = facing_feature(table, shape_b, size_b, matrix_b, offset, back, of_b)
     patch, shift = of_a, 0.5 * separation
     if count_a == 1:
         count = 1

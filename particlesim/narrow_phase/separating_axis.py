@@ -10,13 +10,13 @@ import math
 import numpy as np
 
 from particlesim.jit import kernel
-from particlesim.vec import add, apply, apply_transposed, cross, dot, norm, put, row, scaled, sub
+from particlesim.vec import add, along, apply, apply_transposed, cross, dot, norm, put, row, scaled, sub
 
 # Edges closer to parallel than this [sine of the angle] give no direction worth having; a face normal is as good.
 _PARALLEL_EDGES = 1e-10
 
 # An edge pair must beat the best face by this fraction of the sizes: ties go to faces, whose contact is a patch.
-_FACE_FIRST = 1e-12
+_FACE_FIRST = 1e-14
 
 
 @kernel
@@ -57,20 +57,22 @@ def _one_corner_each(table, shape, vertices):
 
 
 @kernel
-def _best_edge_pair(table, shape_a, vertices_a, normals_a, shape_b, vertices_b, normals_b):
+def _best_edge_pair(edges_a, vertices_a, normals_a, edges_b, vertices_b, normals_b):
     """The deepest-lying crossing of edges: (separation, normal from a to b)."""
     best, best_normal = -math.inf, (0.0, 0.0, 0.0)
-    for i in range(table.edge_start[shape_a], table.edge_start[shape_a + 1]):
-        a = row(vertices_a, table.edge[i, 0])
-        along_a = sub(row(vertices_a, table.edge[i, 1]), a)
-        left_a, right_a = row(normals_a, table.edge[i, 2]), row(normals_a, table.edge[i, 3])
-        for j in range(table.edge_start[shape_b], table.edge_start[shape_b + 1]):
-            left_b = dot(row(normals_b, table.edge[j, 2]), along_a)
-            right_b = dot(row(normals_b, table.edge[j, 3]), along_a)
+    along_face_b = np.empty(len(normals_b))
+    for i in range(len(edges_a)):
+        a = row(vertices_a, edges_a[i, 0])
+        along_a = sub(row(vertices_a, edges_a[i, 1]), a)
+        left_a, right_a = row(normals_a, edges_a[i, 2]), row(normals_a, edges_a[i, 3])
+        for f in range(len(normals_b)):
+            along_face_b[f] = dot(row(normals_b, f), along_a)
+        for j in range(len(edges_b)):
+            left_b, right_b = along_face_b[edges_b[j, 2]], along_face_b[edges_b[j, 3]]
             if left_b * right_b >= 0.0:
                 continue
-            b = row(vertices_b, table.edge[j, 0])
-            along_b = sub(row(vertices_b, table.edge[j, 1]), b)
+            b = row(vertices_b, edges_b[j, 0])
+            along_b = sub(row(vertices_b, edges_b[j, 1]), b)
             on_left, on_right = dot(left_a, along_b), dot(right_a, along_b)
             # The arc of a's normals crosses the mirrored arc of b's, on the same side of the sphere.
             if on_left * on_right >= 0.0 or left_b * on_right >= 0.0:
@@ -81,7 +83,9 @@ def _best_edge_pair(table, shape_a, vertices_a, normals_a, shape_b, vertices_b, 
                 continue
             # Outwards from a: the sum of the edge's two face normals leans that way.
             n = scaled(n, math.copysign(1.0 / length, dot(n, add(left_a, right_a))))
-            separation = dot(n, sub(b, a))
+            # Nearly parallel edges leave n uncertain across them, not along: only the part of b - a across may count.
+            apart = sub(b, a)
+            separation = dot(n, along(apart, along_a, -dot(apart, along_a) / dot(along_a, along_a)))
             if separation > best:
                 best, best_normal = separation, n
     return best, best_normal
@@ -118,7 +122,9 @@ def hull_depth(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offs
     of_b, face = _best_face(normals_b, _one_corner_each(table, shape_b, vertices_b), vertices_a)
     if of_b > separation:
         separation, normal = of_b, scaled(row(normals_b, face), -1.0)
-    of_edges, edge_normal = _best_edge_pair(table, shape_a, vertices_a, normals_a, shape_b, vertices_b, normals_b)
+    edges_a = table.edge[table.edge_start[shape_a] : table.edge_start[shape_a + 1]]
+    edges_b = table.edge[table.edge_start[shape_b] : table.edge_start[shape_b + 1]]
+    of_edges, edge_normal = _best_edge_pair(edges_a, vertices_a, normals_a, edges_b, vertices_b, normals_b)
     scale = table.radius[shape_a] * size_a + table.radius[shape_b] * size_b
     if of_edges > separation + _FACE_FIRST * scale:
         separation, normal = of_edges, edge_normal

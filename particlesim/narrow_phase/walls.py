@@ -2,9 +2,12 @@
 
 import math
 
-from particlesim.constants import MAX_MANIFOLD, PATCH_TOLERANCE, SPHERE
+import numpy as np
+
+from particlesim.constants import MAX_MANIFOLD, SPHERE
 from particlesim.jit import kernel
-from particlesim.vec import apply, matrix_of, put, row, scaled
+from particlesim.narrow_phase.manifold import MAX_CORNERS, facing_feature
+from particlesim.vec import apply, dot, matrix_of, put, row, scaled
 
 
 @kernel
@@ -19,25 +22,23 @@ def wall_normal(wall):
 def wall_contact(table, world, wall, shape, size, turn, position, points):
     """Separation of a particle from a wall and number of contact points, relative to the particle's centroid.
 
-    The points are those of the particle, all as deep as the deepest within PATCH_TOLERANCE: the corners of the face,
-    edge or vertex that touches.
+    The points are those of the particle: the corners of the face, edge or vertex that faces the wall.
     """
     axis, sign = wall // 2, 2.0 * (wall % 2) - 1.0
     plane = world.upper[axis] if wall % 2 else world.lower[axis]
     room = sign * (plane - position[axis])
+    outwards = wall_normal(wall)
     if table.kind[shape] == SPHERE:
-        put(points, 0, scaled(wall_normal(wall), 0.5 * size))
+        put(points, 0, scaled(outwards, 0.5 * size))
         return room - 0.5 * size, 1
     matrix = matrix_of(turn)
-    first, last = table.vertex_start[shape], table.vertex_start[shape + 1]
     farthest = -math.inf
-    for v in range(first, last):
-        farthest = max(farthest, sign * size * apply(matrix, row(table.vertex, v))[axis])
-    count = 0
-    for v in range(first, last):
-        corner = scaled(apply(matrix, row(table.vertex, v)), size)
-        near = sign * corner[axis] >= farthest - PATCH_TOLERANCE * table.radius[shape] * size
-        if near and count < MAX_MANIFOLD:
-            put(points, count, corner)
-            count += 1
-    return room - farthest, count
+    vertex = table.vertex
+    for v in range(table.vertex_start[shape], table.vertex_start[shape + 1]):
+        farthest = max(farthest, dot(outwards, apply(matrix, row(vertex, v))))
+    feature = np.empty((MAX_CORNERS, 3))
+    count, _ = facing_feature(table, shape, size, matrix, (0.0, 0.0, 0.0), outwards, feature)
+    kept = min(count, MAX_MANIFOLD)
+    for k in range(kept):
+        put(points, k, row(feature, k * count // kept))
+    return room - size * farthest, kept

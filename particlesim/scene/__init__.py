@@ -6,39 +6,35 @@ Every model refuses unknown keys. Where a table has kinds, its usual kind has a 
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field, PrivateAttr
+from pydantic import Field, model_validator
 
-from particlesim.scene.base import Model, Positive
+from particlesim.scene.base import MAX_COUNT, Model, PlainFloat, Text, whole
 from particlesim.scene.groups import Group
 from particlesim.scene.picture import Camera, FixedCamera, Movie, Show
+from particlesim.scene.wording import must_be
 from particlesim.scene.world import Solver, World
 
 
 class Scene(Model):
     """A whole scene. ``Scene(...)`` in Python takes what a scene file says, as dicts or as the models above."""
 
-    title: str = ""
-    seed: Annotated[int, Field(ge=0)] = 0
-    duration: Positive = 10.0  # [s]
+    title: Text = ""
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1), whole, must_be("a whole number from 0 to 2^63 - 1")] = 0
+    duration: Annotated[PlainFloat, Field(gt=0, le=1e9), must_be("a number of seconds above 0, up to 1e9")] = 10.0
     world: World
     particles: Annotated[list[Group], Field(min_length=1)]
     solver: Solver = Field(default_factory=Solver)
     movie: Movie = Field(default_factory=Movie)
     camera: Camera = Field(default_factory=lambda: FixedCamera(kind="fixed"))
     show: Show = Field(default_factory=Show)
-    _folder: Path = PrivateAttr(default_factory=Path)
 
-    @property
-    def folder(self) -> Path:
-        """Where relative paths of the scene start: the folder of its file."""
-        return self._folder
-
-    def set_folder(self, folder: Path) -> None:
-        """Let relative paths start at ``folder``."""
-        self._folder = folder
+    @model_validator(mode="after")
+    def _storable(self) -> Scene:
+        if self.number > MAX_COUNT:
+            raise ValueError(f"{self.number:,} particles in all; there may be up to {MAX_COUNT:,}")
+        return self
 
     @property
     def number(self) -> int:

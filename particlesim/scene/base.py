@@ -2,18 +2,53 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 from PIL import ImageColor
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Fraction = Annotated[float, Field(ge=0, le=1)]
-Vector = tuple[Finite, Finite, Finite]
-PositiveVector = tuple[Positive, Positive, Positive]
-Quaternion = tuple[Finite, Finite, Finite, Finite]
+from particlesim.scene.wording import OUT_OF_REACH, hint, must_be
+
+# The sizes that numbers of a scene may have, other than 0: the fifth powers and the products that inertias, momenta
+# and energies are made of stay well inside double precision.
+SMALLEST, LARGEST = 1e-30, 1e30
+
+# More particles than this fit in no memory yet: a kilobyte each.
+MAX_COUNT = 100_000_000
+
+
+def _a_number(value: Any) -> Any:
+    if isinstance(value, bool | str):
+        raise ValueError("not a number")
+    return value
+
+
+def _within_reach(value: float) -> float:
+    if value and not SMALLEST <= abs(value) <= LARGEST:
+        raise PydanticCustomError(OUT_OF_REACH, "neither 0 nor of a usual size")
+    return value
+
+
+# Text and true are no numbers; 1e5 is a whole one.
+PlainFloat = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+_reach = AfterValidator(_within_reach)
+Number = Annotated[PlainFloat, _reach]
+PositiveNumber = Annotated[PlainFloat, Field(gt=0), _reach]
+whole = BeforeValidator(_a_number)
+
+Finite = Annotated[Number, must_be("a finite number")]
+Positive = Annotated[PositiveNumber, must_be("a number above 0")]
+NotNegative = Annotated[PlainFloat, Field(ge=0), _reach, must_be("a number of 0 or more")]
+Fraction = Annotated[PlainFloat, Field(ge=0, le=1), must_be("a number from 0 to 1")]
+Vector = Annotated[tuple[Number, Number, Number], must_be("a list of 3 finite numbers, [x, y, z]")]
+PositiveVector = Annotated[
+    tuple[PositiveNumber, PositiveNumber, PositiveNumber], must_be("a list of 3 numbers above 0, [x, y, z]")
+]
+Text = Annotated[str, must_be("text in quotes")]
+Flag = Annotated[bool, Field(strict=True), must_be("true or false")]
+File = Annotated[Path, must_be("the path of a file, in quotes")]
 
 
 class Model(BaseModel):
@@ -22,23 +57,41 @@ class Model(BaseModel):
     model_config = ConfigDict(extra="forbid", validate_assignment=True)
 
 
-def shorthand(kind: str, key: str | None, *types: type) -> BeforeValidator:
-    """Read a bare value of one of ``types`` as ``{kind = kind, key = value}`` (key None: as the kind itself)."""
+def shorthand(
+    what: str, written: Any, *, bare: tuple[type, ...] = (), table: tuple[str, str] = ("", ""), text: bool = True
+) -> BeforeValidator:
+    """Let ``text`` stand for a table of that kind, and a ``bare`` value for ``{kind = table[0], table[1] = value}``.
+
+    ``what`` says which values are allowed; ``written`` is the type that stands in a scene file, for its JSON Schema.
+    """
 
     def expand(value: Any) -> Any:
-        if isinstance(value, types) and not isinstance(value, bool):
-            return {"kind": value} if key is None else {"kind": kind, key: value}
+        if isinstance(value, dict | BaseModel):
+            return value
+        if text and isinstance(value, str):
+            return {"kind": value}
+        if isinstance(value, bare) and not isinstance(value, bool):
+            return {"kind": table[0], table[1]: value}
+        raise ValueError(f"must be {what}")
+
+    return BeforeValidator(expand, json_schema_input_type=written)
+
+
+def colour_or(*words: str) -> AfterValidator:
+    """Allow a colour or one of ``words``."""
+    also = "".join(f"'{word}', " for word in words)
+
+    def check(value: str) -> str:
+        if value in words:
+            return value
+        try:
+            ImageColor.getrgb(value)
+        except ValueError:
+            meant = hint(value, [*words, *ImageColor.colormap])
+            raise ValueError(f"must be {also}a colour name such as 'steelblue', or '#rrggbb'{meant}") from None
         return value
 
-    return BeforeValidator(expand)
+    return AfterValidator(check)
 
 
-def _known_colour(value: str) -> str:
-    try:
-        ImageColor.getrgb(value)
-    except ValueError:
-        raise ValueError("a colour name such as 'steelblue' or '#rrggbb'") from None
-    return value
-
-
-Colour = Annotated[str, AfterValidator(_known_colour)]
+Colour = Annotated[Text, colour_or()]

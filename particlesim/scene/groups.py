@@ -3,22 +3,37 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationInfo,
+    WithJsonSchema,
+    field_validator,
+    model_validator,
+)
 
 from particlesim.scene.base import (
-    Colour,
+    MAX_COUNT,
+    File,
     Finite,
     Fraction,
     Model,
     NotNegative,
+    Number,
     Positive,
     PositiveVector,
-    Quaternion,
+    Text,
     Vector,
+    colour_or,
     shorthand,
+    whole,
 )
+from particlesim.scene.wording import hint, must_be
 
 
 class PlainShape(Model):
@@ -45,13 +60,21 @@ class MeshShape(Model):
     """The convex hull of an STL, OBJ or PLY file, times the size. Paths start at the scene file's folder."""
 
     kind: Literal["mesh"]
-    file: Path
+    file: File
+
+    @field_validator("file")
+    @classmethod
+    def _from_folder(cls, file: Path, info: ValidationInfo) -> Path:
+        return info.context["folder"] / file if info.context else file
 
 
+_Shapes = Annotated[PlainShape | BoxShape | PyramidShape | MeshShape, Field(discriminator="kind")]
 AnyShape = Annotated[
-    PlainShape | BoxShape | PyramidShape | MeshShape,
-    Field(discriminator="kind"),
-    shorthand("", None, str),
+    _Shapes,
+    shorthand(
+        'a shape such as "sphere", or a table such as { kind = "box", edges = [1, 2, 3] }',
+        _Shapes | Literal["sphere", "cube", "tetrahedron", "pyramid"],
+    ),
 ]
 
 
@@ -72,11 +95,21 @@ class RangeSize(Model):
     @model_validator(mode="after")
     def _ordered(self) -> RangeSize:
         if self.high < self.low:
-            raise ValueError(f"low must not be above high, here {self.low:g} and {self.high:g}")
+            raise ValueError(f"low must not be above high, but {self.low:g} is above {self.high:g}")
         return self
 
 
-Size = Annotated[FixedSize | RangeSize, Field(discriminator="kind"), shorthand("fixed", "value", int, float)]
+_Sizes = Annotated[FixedSize | RangeSize, Field(discriminator="kind")]
+Size = Annotated[
+    _Sizes,
+    shorthand(
+        'a number above 0, or a table such as { kind = "uniform", low = 0.1, high = 0.2 }',
+        _Sizes | Positive,
+        bare=(int, float, np.number),
+        table=("fixed", "value"),
+        text=False,
+    ),
+]
 
 
 class Region(Model):
@@ -112,41 +145,55 @@ class ClusterPlacement(Model):
     """In Gaussian blobs of standard deviation ``spread`` [m] about given or random centres, without overlap."""
 
     kind: Literal["cluster"]
-    clusters: Annotated[int, Field(ge=1)] = 1
+    clusters: Annotated[int, Field(ge=1, le=MAX_COUNT), whole, must_be("a whole number of 1 or more")] | None = None
     spread: Positive
-    centres: list[Vector] | None = None
+    centres: Annotated[list[Vector], Field(min_length=1)] | None = None
     region: Region | None = None
 
     @model_validator(mode="after")
     def _counted(self) -> ClusterPlacement:
-        if self.centres is not None:
-            if "clusters" in self.model_fields_set and self.clusters != len(self.centres):
-                raise ValueError(f"clusters is {self.clusters} but there are {len(self.centres)} centres")
-            if not self.centres:
-                raise ValueError("centres must name at least one point")
+        if None not in (self.centres, self.clusters) and self.clusters != len(self.centres or ()):
+            raise ValueError(f"clusters is {self.clusters}, but there are {len(self.centres or ())} in centres")
         return self
+
+
+def _not_zero(value: tuple[float, ...]) -> tuple[float, ...]:
+    if not any(value):
+        raise ValueError("must not be zero")
+    return value
 
 
 class Turn(Model):
     """A rotation by ``angle`` [degrees] about ``axis``."""
 
-    axis: Vector
+    axis: Annotated[Vector, AfterValidator(_not_zero)]
     angle: Finite
 
-    @model_validator(mode="after")
-    def _axis(self) -> Turn:
-        if not any(self.axis):
-            raise ValueError("axis must not be zero")
-        return self
+
+_HOW_TURNED = "[w, x, y, z] (a quaternion), or { axis = [x, y, z], angle = degrees }"
+Quaternion = Annotated[tuple[Number, Number, Number, Number], must_be(_HOW_TURNED), AfterValidator(_not_zero)]
 
 
-def _not_zero(value: Quaternion) -> Quaternion:
-    if not any(value):
-        raise ValueError("four numbers (w, x, y, z), not all zero")
+def _known_word(value: str) -> str:
+    words = "random", "aligned"
+    if value not in words:
+        raise ValueError(f"must be 'random', 'aligned', {_HOW_TURNED}{hint(value, words)}")
     return value
 
 
-Orientation = Annotated[Quaternion, AfterValidator(_not_zero)] | Turn
+def _form(value: Any) -> str:
+    """How an orientation is written. The brackets tell these names from keys."""
+    return "(turn)" if isinstance(value, dict | Turn) else "(quaternion)"
+
+
+def _form_or_word(value: Any) -> str:
+    return "(word)" if isinstance(value, str) else _form(value)
+
+
+_Given = Annotated[Quaternion, Tag("(quaternion)")] | Annotated[Turn, Tag("(turn)")]
+_Word = Annotated[str, AfterValidator(_known_word), WithJsonSchema({"enum": ["random", "aligned"]})]
+Orientation = Annotated[_Given, Discriminator(_form)]
+AnyOrientation = Annotated[_Given | Annotated[_Word, Tag("(word)")], Discriminator(_form_or_word)]
 
 
 class Pose(Model):
@@ -165,10 +212,15 @@ class ListPlacement(Model):
     poses: Annotated[list[Pose], Field(min_length=1)]
 
 
+_Placements = Annotated[
+    RandomPlacement | LatticePlacement | ClusterPlacement | ListPlacement, Field(discriminator="kind")
+]
 Placement = Annotated[
-    RandomPlacement | LatticePlacement | ClusterPlacement | ListPlacement,
-    Field(discriminator="kind"),
-    shorthand("", None, str),
+    _Placements,
+    shorthand(
+        '"random", "lattice", or a table such as { kind = "cluster", spread = 0.5 }',
+        _Placements | Literal["random", "lattice"],
+    ),
 ]
 
 
@@ -223,33 +275,49 @@ class SpinUniform(Model):
     speed: NotNegative
 
 
+_VECTOR_OR_TABLE = 'a list of 3 numbers, [x, y, z], or a table such as { kind = "maxwell", temperature = 1 }'
+_Velocities = Annotated[Rest | Maxwell | UniformSpeed | FixedVelocity | RadialVelocity, Field(discriminator="kind")]
+_Spins = Annotated[Rest | SpinMaxwell | SpinUniform | FixedVelocity, Field(discriminator="kind")]
 Velocity = Annotated[
-    Rest | Maxwell | UniformSpeed | FixedVelocity | RadialVelocity,
-    Field(discriminator="kind"),
-    shorthand("fixed", "vector", list, tuple),
+    _Velocities,
+    shorthand(
+        _VECTOR_OR_TABLE,
+        _Velocities | Vector | Literal["rest"],
+        bare=(list, tuple, np.ndarray),
+        table=("fixed", "vector"),
+    ),
 ]
 Spin = Annotated[
-    Rest | SpinMaxwell | SpinUniform | FixedVelocity,
-    Field(discriminator="kind"),
-    shorthand("fixed", "vector", list, tuple),
+    _Spins,
+    shorthand(
+        _VECTOR_OR_TABLE,
+        _Spins | Vector | Literal["rest"],
+        bare=(list, tuple, np.ndarray),
+        table=("fixed", "vector"),
+    ),
 ]
+
+
+Count = Annotated[int, Field(ge=0, le=MAX_COUNT), whole, must_be(f"a whole number from 0 to {MAX_COUNT:,}")]
 
 
 class Group(Model):
     """Particles of one shape, one law of sizes and one start."""
 
-    name: str | None = None
+    name: Text | None = None
     shape: AnyShape
-    count: Annotated[int, Field(ge=0)] | None = None
+    count: (
+        Annotated[int, Field(ge=0, le=MAX_COUNT), whole, must_be(f"a whole number from 0 to {MAX_COUNT:,}")] | None
+    ) = None
     size: Size = Field(default_factory=lambda: FixedSize(kind="fixed", value=1.0))
     density: Positive | None = None  # [kg/m^3]; 1000 if neither it nor the mass is given
     mass: Positive | None = None  # [kg]
     restitution: Fraction | None = None  # the world's if not given; a pair takes the smaller of its two
     placement: Placement = Field(default_factory=lambda: RandomPlacement(kind="random"))
-    orientation: Literal["random", "aligned"] | Orientation = "random"
+    orientation: AnyOrientation = "random"
     velocity: Velocity = Field(default_factory=lambda: Rest(kind="rest"))
     spin: Spin = Field(default_factory=lambda: Rest(kind="rest"))
-    colour: Literal["by_shape", "by_group", "by_speed"] | Colour = "by_shape"
+    colour: Annotated[Text, colour_or("by_shape", "by_group", "by_speed")] = "by_shape"
 
     @model_validator(mode="after")
     def _consistent(self) -> Group:
@@ -258,9 +326,9 @@ class Group(Model):
         if isinstance(self.placement, ListPlacement):
             listed = len(self.placement.poses)
             if self.count is not None and self.count != listed:
-                raise ValueError(f"count is {self.count} but the list has {listed} poses")
+                raise ValueError(f"count is {self.count}, but there are {listed} in poses")
         elif self.count is None:
-            raise ValueError("count is missing")
+            raise ValueError("the key 'count' is missing")
         return self
 
     @property

@@ -6,7 +6,11 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from particlesim.scene.base import Colour, Finite, Model, Positive, Vector, shorthand
+from particlesim.scene.base import Colour, Finite, Flag, Model, Number, PlainFloat, Positive, Vector, shorthand, whole
+from particlesim.scene.wording import must_be
+
+Elevation = Annotated[PlainFloat, Field(ge=-89, le=89), must_be("an angle from -89 to 89 degrees")]
+FieldOfView = Annotated[PlainFloat, Field(ge=2, le=149), must_be("an angle from 2 to 149 degrees")]
 
 
 class FixedCamera(Model):
@@ -14,8 +18,8 @@ class FixedCamera(Model):
 
     kind: Literal["fixed"]
     azimuth: Finite = 30.0  # [degrees] about z, from +x
-    elevation: Annotated[float, Field(ge=-89, le=89)] = 20.0  # [degrees] above the horizon
-    field_of_view: Annotated[float, Field(gt=1, lt=150)] = 40.0  # [degrees], vertical
+    elevation: Elevation = 20.0  # [degrees] above the horizon
+    field_of_view: FieldOfView = 40.0  # [degrees], vertical
 
 
 class LookAtCamera(Model):
@@ -24,7 +28,7 @@ class LookAtCamera(Model):
     kind: Literal["look-at"]
     position: Vector
     target: Vector = (0.0, 0.0, 0.0)
-    field_of_view: Annotated[float, Field(gt=1, lt=150)] = 40.0
+    field_of_view: FieldOfView = 40.0
 
     @model_validator(mode="after")
     def _apart(self) -> LookAtCamera:
@@ -33,47 +37,59 @@ class LookAtCamera(Model):
         return self
 
 
+def _not_zero(value: float) -> float:
+    if value == 0:
+        raise ValueError("zero")
+    return value
+
+
 class OrbitCamera(Model):
     """Circles the target once in ``period`` seconds; the distance is chosen to fit the world if not given."""
 
     kind: Literal["orbit"]
-    period: Annotated[float, Field(allow_inf_nan=False)] = 20.0  # [s]; negative turns the other way
+    period: Annotated[Number, AfterValidator(_not_zero), must_be("a number of seconds, not 0")] = (
+        20.0  # [s]; negative turns the other way
+    )
     azimuth: Finite = 30.0  # [degrees] at the start
-    elevation: Annotated[float, Field(ge=-89, le=89)] = 20.0
+    elevation: Elevation = 20.0
     distance: Positive | None = None  # [m]
     target: Vector = (0.0, 0.0, 0.0)
-    field_of_view: Annotated[float, Field(gt=1, lt=150)] = 40.0
-
-    @model_validator(mode="after")
-    def _turns(self) -> OrbitCamera:
-        if self.period == 0:
-            raise ValueError("period must not be zero")
-        return self
+    field_of_view: FieldOfView = 40.0
 
 
-Camera = Annotated[FixedCamera | LookAtCamera | OrbitCamera, Field(discriminator="kind"), shorthand("", None, str)]
+_Cameras = Annotated[FixedCamera | LookAtCamera | OrbitCamera, Field(discriminator="kind")]
+Camera = Annotated[
+    _Cameras,
+    shorthand(
+        '"fixed", "orbit", or a table such as { kind = "look-at", position = [5, 3, 2] }',
+        _Cameras | Literal["fixed", "orbit"],
+    ),
+]
 
 
 def _even(value: int) -> int:
+    # H.264 with colours at half the resolution (yuv420p) has no odd edges.
     if value % 2:
-        raise ValueError("an even number of pixels, as H.264 with yuv420p needs")
+        raise ValueError("odd")
     return value
 
 
-Pixels = Annotated[int, Field(ge=64, le=7680), AfterValidator(_even)]
+Pixels = Annotated[int, Field(ge=64, le=7680), whole, AfterValidator(_even)]
 
 
 class Movie(Model):
     """The file that comes out."""
 
-    fps: Annotated[float, Field(ge=1, le=240)] = 30.0
-    resolution: tuple[Pixels, Pixels] = (1280, 720)
+    fps: Annotated[PlainFloat, Field(ge=1, le=240), must_be("a number of frames a second from 1 to 240")] = 30.0
+    resolution: Annotated[
+        tuple[Pixels, Pixels], must_be("[width, height] in pixels, two even whole numbers from 64 to 7680")
+    ] = (1280, 720)
     background: Colour = "#f4f2ee"
 
 
 class Show(Model):
     """What is drawn besides the particles."""
 
-    box: bool = True  # edges of the world
-    cells: bool = False  # leaves of the octree
-    readout: bool = True  # time, particles, impacts, energy
+    box: Flag = True  # edges of the world
+    cells: Flag = False  # leaves of the octree
+    readout: Flag = True  # time, particles, impacts, energy

@@ -2,13 +2,35 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from particlesim.scene.base import Fraction, Model, Positive, PositiveVector, Vector, shorthand
+from particlesim.scene.base import (
+    Fraction,
+    Model,
+    PositiveNumber,
+    PositiveVector,
+    Vector,
+    shorthand,
+    whole,
+)
+from particlesim.scene.wording import hint, listed, must_be
 
 Boundary = Literal["wall", "periodic", "open"]
+_BOUNDARIES = "wall", "periodic", "open"
+
+
+def _for_each_axis(value: Any) -> Any:
+    """One word for all axes, or a list of three. ValueError that names the word that is none."""
+    words = (value,) * 3 if isinstance(value, str) else value
+    if not isinstance(words, list | tuple) or len(words) != 3:
+        raise ValueError(f"must be {listed(_BOUNDARIES)}, or a list of 3 of them, for x, y and z")
+    for word in words:
+        if word not in _BOUNDARIES:
+            meant = hint(word, _BOUNDARIES) if isinstance(word, str) else ""
+            raise ValueError(f"must be {listed(_BOUNDARIES)}, or a list of 3 of them{meant}")
+    return words
 
 
 class World(Model):
@@ -17,7 +39,7 @@ class World(Model):
     size: PositiveVector
     boundary: Annotated[
         tuple[Boundary, Boundary, Boundary],
-        BeforeValidator(lambda value: (value,) * 3 if isinstance(value, str) else value),
+        BeforeValidator(_for_each_axis, json_schema_input_type=Boundary | tuple[Boundary, Boundary, Boundary]),
     ] = ("wall", "wall", "wall")
     gravity: Vector = (0.0, 0.0, 0.0)  # [m/s^2]
     restitution: Fraction = 1.0
@@ -33,21 +55,30 @@ class Grid(Model):
     """A uniform grid of ``cells`` x ``cells`` x ``cells`` boxes; from number and sizes of particles if not given."""
 
     kind: Literal["grid"]
-    cells: Annotated[int, Field(ge=1, le=1024)] | None = None
+    cells: Annotated[int, Field(ge=1, le=1024), whole, must_be("a whole number from 1 to 1024")] | None = None
 
 
 class Octree(Model):
     """Nodes split while they hold more than ``max_count`` particles, down to ``max_depth``."""
 
     kind: Literal["octree"]
-    max_count: Annotated[int, Field(ge=1)] = 16
-    max_depth: Annotated[int, Field(ge=1, le=20)] = 16
+    max_count: Annotated[int, Field(ge=1, le=1_000_000), whole, must_be("a whole number from 1 to 1,000,000")] = 16
+    max_depth: Annotated[int, Field(ge=1, le=20), whole, must_be("a whole number from 1 to 20")] = 16
+
+
+_BroadPhases = Annotated[Naive | Grid | Octree, Field(discriminator="kind")]
 
 
 class Solver(Model):
     """How the motion is computed. None of it changes which pairs meet."""
 
-    broad_phase: Annotated[Naive | Grid | Octree, Field(discriminator="kind"), shorthand("", None, str)] = Field(
-        default_factory=lambda: Octree(kind="octree")
+    broad_phase: Annotated[
+        _BroadPhases,
+        shorthand(
+            '"octree", "grid", "naive", or a table such as { kind = "grid", cells = 32 }',
+            _BroadPhases | Literal["octree", "grid", "naive"],
+        ),
+    ] = Field(default_factory=lambda: Octree(kind="octree"))
+    time_step: Annotated[Literal["auto"] | PositiveNumber, must_be("'auto' or a number of seconds above 0")] = (
+        "auto"  # [s]
     )
-    time_step: Literal["auto"] | Positive = "auto"  # [s]

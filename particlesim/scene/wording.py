@@ -1,0 +1,62 @@
+"""What a scene's author reads when a value is wrong: what it must be, and the word that was probably meant."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from pydantic import ValidationError, WrapValidator
+
+# Values and lists of allowed words longer than this are cut short in a message [characters].
+_WIDTH = 60
+
+# Name of the error of a number that is too large or too close to 0 to compute with.
+OUT_OF_REACH = "out_of_reach"
+
+
+def must_be(what: str) -> WrapValidator:
+    """Let a type refuse values with the words ``must be <what>`` in place of pydantic's."""
+
+    def check(value: Any, accept: Callable[[Any], Any]) -> Any:
+        try:
+            return accept(value)
+        except ValidationError as error:
+            beyond = any(each["type"] == OUT_OF_REACH for each in error.errors())
+            size = ", between 1e-30 and 1e30 in size" if beyond else ""
+            raise ValueError(f"must be {what}{size}") from None
+
+    return WrapValidator(check)
+
+
+def hint(word: str, allowed: Iterable[str]) -> str:
+    """The allowed word that looks like ``word`` as a question, or nothing."""
+    close = difflib.get_close_matches(word.lower(), list(allowed), n=1)
+    return f"; did you mean '{close[0]}'?" if close else ""
+
+
+def listed(words: Iterable[str]) -> str:
+    """Words in quotes, the last after an 'or'."""
+    quoted = [f"'{word}'" for word in words]
+    return " or ".join([", ".join(quoted[:-1]), quoted[-1]] if len(quoted) > 1 else quoted)
+
+
+def shown(value: Any) -> str:
+    """A value as TOML would write it, on one line, cut short where it is long."""
+    text = _toml(value)
+    return text if len(text) <= _WIDTH else f"{text[: _WIDTH - 3]}..."
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float) and not math.isfinite(value):
+        return "nan" if math.isnan(value) else "inf" if value > 0.0 else "-inf"
+    if isinstance(value, str):
+        return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in value) + '"'
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(_toml(item) for item in value)}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key} = {_toml(item)}' for key, item in value.items())}}}"
+    return str(value)

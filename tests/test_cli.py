@@ -1,0 +1,250 @@
+"""The commands: what they print, what they leave behind, and with which exit code they end."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+from typer.testing import CliRunner
+
+from particlesim import cli
+from particlesim.diagnosis import Finding
+from particlesim.progress import shown_progress
+from particlesim.scene.file import SceneError
+
+SCENE = """
+duration = 0.1
+[world]
+size = [4.0, 4.0, 4.0]
+[[particles]]
+name = "[red]balls[/red]"
+shape = "sphere"
+count = 5
+size = 0.3
+velocity = { kind = "maxwell", temperature = 6.0 }
+[movie]
+resolution = [64, 64]
+"""
+
+TOO_LARGE = "particles[0].size = 5.0: too large: particles are 5 m thick, between walls 4 m apart"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(SCENE)
+    return tmp_path
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli.app, arguments)
+
+
+def program(*arguments, **options):
+    return subprocess.run(
+        [sys.executable, "-m", "particlesim", *arguments], capture_output=True, text=True, check=False, **options
+    )
+
+
+def files(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_help_loads_nothing_heavy():
+    heavy = "{'numba', 'scipy', 'numpy', 'pydantic', 'rich', 'PIL', 'gsd', 'trimesh'}"
+    code = f"import sys, particlesim.cli; print(sorted({heavy} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+def test_without_arguments_there_is_help():
+    for result in (run(), run("--help")):
+        assert "Usage: " in result.output
+        for command in ("render", "simulate", "check", "doctor", "schema"):
+            assert command in result.output
+
+
+def test_the_module_runs_as_the_command_does():
+    result = program("--version")
+    assert re.fullmatch(r"particlesim \d+\.\d+\.\d+\n", result.stdout)
+    assert (result.returncode, result.stderr) == (0, "")
+
+
+def test_check_says_what_a_scene_amounts_to(folder):
+    result = run("check", "scene.toml")
+    assert result.exit_code == 0
+    for words in ("[red]balls[/red]", "5 x sphere, size 0.3", "4 x 4 x 4 m", "0.0011", "octree", "4 of 64 x 64 at 30"):
+        assert words in result.stdout
+    assert files(folder) == ["scene.toml"]
+
+
+def test_the_schema_is_json(folder):
+    assert '"particles"' in run("schema").stdout
+
+
+def test_simulate_writes_a_trajectory_and_says_so(folder):
+    result = run("simulate", "scene.toml")
+    assert (result.exit_code, files(folder / "renders")) == (0, ["scene.gsd"])
+    assert "renders/scene.gsd" in result.stdout
+    assert result.stderr.splitlines()[0] == "preparing 4 frames"
+    assert result.stderr.splitlines()[-1] == "simulating: frame 4 of 4"
+
+
+def test_quiet_prints_nothing_and_a_missing_ending_is_added(folder):
+    result = run("simulate", "scene.toml", "--quiet", "-o", "run")
+    assert (result.exit_code, result.output) == (0, "")
+    assert files(folder) == ["run.gsd", "scene.toml"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["check", "none.toml"], "none.toml: no such file"),
+        (["check", "scen.toml"], "scen.toml: no such file; did you mean 'scene.toml'?"),
+        (["check", "."], ".: is a folder, not a scene file"),
+        (["check", "run.gsd"], "run.gsd: must be a scene file (TOML)"),
+        (["simulate", "scene.toml", "-o", "none/run.gsd"], "none/run.gsd: there is no folder none"),
+        (["simulate", "scene.toml", "-o", "run.txt"], "run.txt: the output must end in .gsd"),
+        (["render", "scene.toml", "-o", "movie.avi"], "movie.avi: the output must end in .mp4"),
+        (["render", "scene.toml", "-o", "."], ".: is a folder, not a file to write to"),
+        (["render", "none.gsd"], "none.gsd: no such file"),
+        (["simulate", "full.toml"], f"full.toml: {TOO_LARGE}"),
+        (["render", "full.toml"], f"full.toml: {TOO_LARGE}"),
+    ],
+)  # fmt: skip
+def test_wrong_input_gets_one_line_and_leaves_nothing(arguments, line, folder):
+    (folder / "full.toml").write_text(SCENE.replace("size = 0.3", "size = 5"))
+    before = files(folder)
+    result = run(*arguments, "-q") if arguments[0] != "check" else run(*arguments)
+    assert (result.exit_code, result.stderr, result.stdout) == (2, line + "\n", "")
+    assert files(folder) == before
+
+
+@pytest.mark.parametrize("content", [b"", b"garbage", bytes(range(256)) * 16])
+def test_a_file_that_is_no_trajectory_gets_one_line(content, folder):
+    (folder / "run.gsd").write_bytes(content)
+    result = run("render", "run.gsd", "-q")
+    assert (result.exit_code, result.stdout, result.stderr.count("\n")) == (2, "", 1)
+    assert result.stderr.startswith("run.gsd: ")
+    assert files(folder) == ["run.gsd", "scene.toml"]
+
+
+def test_an_output_that_was_there_survives_a_failure(folder):
+    (folder / "run.gsd").write_text("of yesterday")
+    (folder / "scene.toml").write_text(SCENE.replace("size = 0.3", "size = 5"))
+    assert run("simulate", "scene.toml", "-o", "run.gsd").exit_code == 2
+    assert (folder / "run.gsd").read_text() == "of yesterday"
+
+
+def failing(error):
+    def fail(*_, **__):
+        raise error
+
+    return fail
+
+
+def test_bugs_are_not_hidden(folder, monkeypatch):
+    for error in (ValueError("a bug"), RuntimeError("a bug"), KeyError("a bug")):
+        monkeypatch.setattr("particlesim.pipeline.simulate", failing(error))
+        result = run("simulate", "scene.toml")
+        assert (result.exit_code, result.exception) == (1, error)
+
+
+def test_failures_of_the_machine_are_one_line(folder, monkeypatch):
+    monkeypatch.setattr("particlesim.pipeline.simulate", failing(OSError(28, "No space left on device", "run.gsd")))
+    result = run("simulate", "scene.toml", "-q")
+    assert (result.exit_code, result.output) == (1, "run.gsd: No space left on device\n")
+    monkeypatch.setattr("particlesim.pipeline.simulate", failing(SceneError("is odd", "world", 3)))
+    assert run("simulate", "scene.toml", "-q").output == "scene.toml: world = 3: is odd\n"
+    assert files(folder) == ["scene.toml"]
+
+
+def test_the_doctor_ends_with_the_fix_on_a_line_of_its_own(monkeypatch):
+    fix = "OpenGL is missing: install it with: apt-get install -y --no-install-recommends libegl1 libgl1"
+    monkeypatch.setattr("particlesim.diagnosis.diagnose", lambda: [Finding("OpenGL", False, fix)])
+    result = run("doctor")
+    assert (result.exit_code, result.stderr) == (1, f"OpenGL: {fix}\n")
+    assert "missing, see below" in result.stdout
+    monkeypatch.setattr("particlesim.diagnosis.diagnose", lambda: [Finding("OpenGL", True, "there")])
+    assert run("doctor").exit_code == 0
+
+
+def test_ctrl_c_ends_with_one_line_and_nothing_half_written(folder):
+    (folder / "scene.toml").write_text(SCENE.replace("duration = 0.1", "duration = 1e6"))
+    # A shell that runs tests in the background ignores the signal, and children inherit that.
+    child = subprocess.Popen(
+        [sys.executable, "-m", "particlesim", "simulate", "scene.toml"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # noqa: PLW1509
+    )
+    lines = []
+    for line in child.stderr:
+        lines.append(line)
+        if line.startswith("simulating"):
+            assert any(name.startswith(".scene.") for name in os.listdir("renders"))
+            child.send_signal(signal.SIGINT)
+            break
+    rest, errors = child.communicate(timeout=60)
+    assert (child.returncode, rest) == (130, "")
+    assert errors.splitlines()[-1] == "interrupted; nothing was written"
+    assert "Traceback" not in errors
+    assert files(folder) == ["scene.toml"]
+
+
+def test_a_reader_that_leaves_is_no_error(folder):
+    child = subprocess.Popen(
+        [sys.executable, "-m", "particlesim", "schema"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    child.stdout.close()
+    assert child.stderr.read() == ""
+    child.stderr.close()
+    child.wait(timeout=60)
+
+
+def test_plain_progress_lines_carry_an_estimate(capsys, monkeypatch):
+    clock = iter(range(0, 10_000, 10))
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+    with shown_progress(quiet=False) as progress:
+        progress("preparing", 0, 100)
+        for done in range(1, 101):
+            progress("simulating", done, 100)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[:3] == ["preparing 100 frames", "simulating: frame 1 of 100", "simulating: frame 2 of 100"]
+    assert lines[3] == "simulating: frame 3 of 100, 32 min left"
+    assert lines[-2:] == ["simulating: frame 99 of 100, 20 s left", "simulating: frame 100 of 100"]
+
+
+def test_a_terminal_gets_a_bar(folder):
+    pty = pytest.importorskip("pty")
+    leader, follower = pty.openpty()
+    seen = []
+
+    def read():
+        with os.fdopen(leader, "rb", buffering=0) as stream:
+            try:
+                while data := stream.read(4096):
+                    seen.append(data)
+            except OSError:  # the other end is closed
+                pass
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "100"}
+    result = subprocess.run(
+        [sys.executable, "-m", "particlesim", "simulate", "scene.toml"],
+        stdout=subprocess.DEVNULL,
+        stderr=follower,
+        env=environment,
+        check=False,
+    )
+    os.close(follower)
+    reader.join(timeout=60)
+    text = b"".join(seen).decode()
+    assert result.returncode == 0
+    assert "preparing" in text
+    assert "frame 4 of 4" in text
