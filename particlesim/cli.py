@@ -236,7 +236,7 @@ def _print_summary(summary: Summary, path: Path) -> None:
         ("frames", summary.frames),
         ("simulated", f"{summary.simulated_seconds:g} s"),
         ("impacts", f"{summary.impacts:,}"),
-        ("worst energy change", f"{summary.worst_energy_drift:.1e} of the kinetic energy"),
+        ("worst energy change", f"{summary.worst_energy_drift:.1e} of all of it"),
         ("momentum not accounted for", f"{summary.momentum_error:.1e}"),
         ("largest overlap", f"{summary.largest_overlap:.1e} m"),
     ]

@@ -116,7 +116,7 @@ def put_in_place(world, placed, who):
         placed.head[bucket] = i
 
 
-@kernel
+@kernel(inline=True)
 def _meets_any(
     table, kind, shape, size, radius, lower, upper, period, position, orientation, head, behind, cells, i, point, points
 ):

@@ -56,8 +56,10 @@ def sums(world, constants, state):
     translational = rotational = potential = 0.0
     momentum = angular = (0.0, 0.0, 0.0)
     gravity = row(world.gravity.reshape(1, 3), 0)
-    bottom = np.where(world.gravity > 0.0, world.upper, world.lower)
-    lowest = dot(gravity, row(bottom.reshape(1, 3), 0))
+    # Gravity times the corner of the world that it points to.
+    lowest = 0.0
+    for axis in range(3):
+        lowest += max(gravity[axis] * world.lower[axis], gravity[axis] * world.upper[axis])
     for i in range(len(constants.mass)):
         m, v, x = constants.mass[i], row(state.velocity, i), row(state.position, i)
         own = row(state.angular_momentum, i)

@@ -85,7 +85,7 @@ def render(
 
 
 def _start(scene: Scene, threads: int | None, progress: Progress | None) -> Simulation:
-    if not any(Path(CACHE_FOLDER).iterdir()):
+    if not any(Path(CACHE_FOLDER).rglob("*.nbi")):
         _tell(progress, "compiling, this once", 0, scene.frames)
         _compile(scene)
     _tell(progress, "preparing", 0, scene.frames)

@@ -153,7 +153,7 @@ def _answer_patch(world, constants, state, i, j, offset, normal, points, count, 
 # ---- when it was ---------------------------------------------------------------------------------------------------
 
 
-@kernel
+@kernel(inline=True)
 def _separation_before(table, world, constants, state, i, j, earlier, points):
     """Separation of i and j ``earlier`` seconds before now, along their free paths."""
     other = max(j, 0)
@@ -163,7 +163,7 @@ def _separation_before(table, world, constants, state, i, j, earlier, points):
     return separation
 
 
-@kernel
+@kernel(inline=True)
 def _moment_apart(table, world, constants, state, i, j, start, tolerance, points):
     """The first moment, ``start`` seconds ago or later, at which i and j were apart, and their separation then.
 
@@ -182,7 +182,7 @@ def _moment_apart(table, world, constants, state, i, j, start, tolerance, points
     return (start if at_start >= -tolerance else 0.0), at_start
 
 
-@kernel
+@kernel(inline=True)
 def _time_since_impact(table, world, constants, state, clock, i, j, points):
     """How long ago i and j met [s], by regula falsi on the exact separation; 0 if they overlapped all along.
 
@@ -226,7 +226,7 @@ def _move_both(constants, state, world, i, j, time):
             move(constants, state, world, j, time)
 
 
-@kernel
+@kernel(inline=True)
 def _answer(table, world, constants, state, clock, tally, i, j, earlier, points):
     """Take i and j back to their impact, answer it, and let them go on; returns whether they approached."""
     _move_both(constants, state, world, i, j, -earlier)
@@ -241,8 +241,19 @@ def _answer(table, world, constants, state, clock, tally, i, j, earlier, points)
 
 
 @kernel
-def respond(table, world, constants, state, contacts, clock, tally, moved):
-    """Answer contacts (m, 2) in the order of their impacts, each particle at most once a round.
+def times_since_impact(table, world, constants, state, contacts, clock):
+    """How long ago the partners of each contact met [s], (m,) (see _time_since_impact)."""
+    points = np.empty((MAX_MANIFOLD, 3))
+    earlier = np.empty(len(contacts))
+    for k in range(len(contacts)):
+        i, j = contacts[k, 0], contacts[k, 1]
+        earlier[k] = _time_since_impact(table, world, constants, state, clock, i, j, points)
+    return earlier
+
+
+@kernel
+def respond(table, world, constants, state, contacts, earlier, order, clock, tally, moved):
+    """Answer contacts (m, 2) that met ``earlier`` (m,) [s] ago, in the given order, each particle at most once.
 
     ``clock`` (n,) [s] is how long each particle has been on its present path within the step. Particles whose
     path changed are marked in ``moved`` (n,): their other contacts are out of date and wait for the next round.
@@ -250,13 +261,8 @@ def respond(table, world, constants, state, contacts, clock, tally, moved):
     """
     moved[:] = False
     points = np.empty((MAX_MANIFOLD, 3))
-    earlier = np.empty(len(contacts))
-    for k in range(len(contacts)):
-        i, j = contacts[k, 0], contacts[k, 1]
-        earlier[k] = _time_since_impact(table, world, constants, state, clock, i, j, points)
     again = False
-    # A stable sort: impacts at the same moment are taken in the canonical order of their pairs.
-    for k in np.argsort(-earlier, kind="mergesort"):
+    for k in order:
         i, j = contacts[k, 0], contacts[k, 1]
         other = i if j < 0 else j
         if moved[i] or moved[other]:

@@ -14,7 +14,7 @@ from particlesim.crew import Crew, use_threads
 from particlesim.ledger import Ledger, sums
 from particlesim.motion import advance, longest_step, spins
 from particlesim.narrow_phase.contacts import deepest_overlap, touching_pairs, touching_walls
-from particlesim.response import Tally, respond
+from particlesim.response import Tally, respond, times_since_impact
 from particlesim.scene import Scene
 from particlesim.state import Particles
 from particlesim.trajectory import Frame, Header
@@ -111,7 +111,10 @@ class Simulation:
             if not len(pairs) and not len(walls):
                 return
             contacts = np.concatenate([pairs, walls])
-            if not respond(*where, contacts, self._clock, self._tally, self._moved):
+            earlier = times_since_impact(*where, contacts, self._clock)
+            # Stable: impacts at the same moment are taken in the canonical order of their pairs.
+            order = np.argsort(-earlier, kind="stable")
+            if not respond(*where, contacts, earlier, order, self._clock, self._tally, self._moved):
                 return
         self._unresolved += 1
 

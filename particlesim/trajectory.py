@@ -126,8 +126,8 @@ class Trajectory:
             raise TrajectoryError(f"{path}: no such file")
         try:
             self._file = gsd.hoomd.open(str(path), "r")
-        except (OSError, RuntimeError) as error:
-            raise TrajectoryError(f"{path}: not a GSD file: {error}") from None
+        except (OSError, RuntimeError):
+            raise TrajectoryError(f"{path}: not a GSD file, or cannot be read") from None
         try:
             self._first = self._file[0] if len(self._file) else None
             if self._first is None or _LOG + "scene" not in self._first.log:
