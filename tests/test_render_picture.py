@@ -5,7 +5,7 @@ import pytest
 
 from particlesim import shapes
 from particlesim.constants import SPHERE
-from particlesim.rendering import Renderer, RenderError, platform
+from particlesim.rendering import Renderer
 from particlesim.scene import Scene
 from particlesim.trajectory import Frame, Header
 
@@ -13,14 +13,6 @@ WIDTH, HEIGHT = 320, 240
 EYE = np.array([10.0, 0.0, 0.0])
 SLOPE = np.tan(np.radians(20.0))  # of the upper edge of a picture with a field of view of 40 degrees
 WHITE = "#ffffff"
-
-
-@pytest.fixture(scope="module", autouse=True)
-def opengl():
-    try:
-        platform.choose()
-    except RenderError as error:
-        pytest.skip(str(error))
 
 
 def make_scene(*colours, world=None, background=WHITE, camera=None, **show):

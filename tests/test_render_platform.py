@@ -70,8 +70,7 @@ def test_a_driver_that_crashes_takes_only_the_probe_with_it(monkeypatch, tmp_pat
 
 def test_every_platform_of_this_machine_draws_the_same_picture():
     working = [name for name in platform.PLATFORMS if isinstance(platform._probe(name), platform.Platform)]
-    if not working:
-        pytest.skip("no OpenGL here")
+    assert working, f"no OpenGL: {platform.FIX}"
     pictures = {tuple(draw(PYOPENGL_PLATFORM=name)) for name in working}
     assert len(pictures) == 1
     assert len(bytes.fromhex(pictures.pop()[0])) == 128 * 96 * 3
@@ -79,7 +78,4 @@ def test_every_platform_of_this_machine_draws_the_same_picture():
 
 def test_descriptions_are_one_line():
     assert "ffmpeg version" in platform.describe_ffmpeg() and "\n" not in platform.describe_ffmpeg()
-    try:
-        assert "OpenGL" in platform.describe() and "\n" not in platform.describe()
-    except RenderError:
-        pytest.skip("no OpenGL here")
+    assert "OpenGL" in platform.describe() and "\n" not in platform.describe()
