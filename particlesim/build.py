@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from particlesim.broad_phase import find_pairs
 from particlesim.constants import MAX_MANIFOLD, OPEN, PERIODIC, WALL, WALL_NAMES
 from particlesim.launch import initial_state, random_quaternions
-from particlesim.narrow_phase.contacts import contact_now, touching_pairs, touching_walls
+from particlesim.narrow_phase.contacts import contact_now, touching_pairs, touching_walls, wall_of_partner
 from particlesim.placement import positions
 from particlesim.scene import Scene
 from particlesim.scene.file import SceneError
@@ -233,7 +233,9 @@ def _check_apart(scene: Scene, table: ShapeTable, world: World, constants: Const
             if separation < -_TOLERATED_OVERLAP * constants.radius[i]:
                 deep = f"{-separation:.3g} m"
                 if j < 0:
-                    raise _start_error(scene, constants, i, f"sticks {deep} through the {WALL_NAMES[-1 - j]} wall")
+                    raise _start_error(
+                        scene, constants, i, f"sticks {deep} through the {WALL_NAMES[wall_of_partner(j)]} wall"
+                    )
                 g, k = _place_in_group(constants, j)
                 raise _start_error(scene, constants, i, f"starts {deep} inside particle {k} of particles[{g}]")
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from particlesim.jit import kernel
 from particlesim.motion import particle_spin
-from particlesim.vec import add, along, cross, dot, put, row, scaled
+from particlesim.vec import add, along, cross, dot, put, row, scaled, vector
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def sums(world, constants, state):
     """Rows (3, 3): energies of translation, of rotation and in the field; momentum; angular momentum."""
     translational = rotational = potential = 0.0
     momentum = angular = (0.0, 0.0, 0.0)
-    gravity = row(world.gravity.reshape(1, 3), 0)
+    gravity = vector(world.gravity)
     # Gravity times the corner of the world that it points to.
     lowest = 0.0
     for axis in range(3):

@@ -27,6 +27,7 @@ from particlesim.vec import (
     row4,
     scaled,
     unit_quaternion,
+    vector,
 )
 
 # Moments of inertia closer than this fraction of each other are equal: the body is a symmetric top.
@@ -194,7 +195,7 @@ def path_of(constants, state, world, i, time):
         row(state.velocity, i),
         row(state.angular_momentum, i),
         row(constants.inertia, i),
-        (world.gravity[0], world.gravity[1], world.gravity[2]),
+        vector(world.gravity),
         time,
     )
 
@@ -225,7 +226,7 @@ def advance(table, constants, state, world, time, lower, upper, first, last):
     momentum, image, inertia = state.angular_momentum, state.image, constants.inertia
     shape, size, inradius = constants.shape, constants.size, constants.inradius
     kind, vertices, start = table.kind, table.vertex, table.vertex_start
-    gravity, corner, period = row(world.gravity.reshape(1, 3), 0), world.lower, world.period
+    gravity, corner, period = vector(world.gravity), world.lower, world.period
     for i in range(first, last):
         x, q, v = free_path(
             row(position, i), row4(orientation, i), row(velocity, i), row(momentum, i), row(inertia, i), gravity, time
@@ -254,7 +255,7 @@ def longest_step(constants, state, world):
     """
     velocity, orientation, momentum = state.velocity, state.orientation, state.angular_momentum
     inertia, radius, inradius = constants.inertia, constants.radius, constants.inradius
-    g = norm(row(world.gravity.reshape(1, 3), 0))
+    g = norm(vector(world.gravity))
     longest = math.inf
     for i in range(len(radius)):
         spin = spin_of(row4(orientation, i), row(momentum, i), row(inertia, i))

@@ -20,8 +20,8 @@ from particlesim.constants import (
 )
 from particlesim.jit import kernel
 from particlesim.motion import move, particle_spin, path_of, spin_of
-from particlesim.narrow_phase.contacts import contact_between, contact_now
-from particlesim.vec import add, along, cross, dot, norm, put, row, row4, scaled, sub
+from particlesim.narrow_phase.contacts import contact_between, contact_now, wall_of_partner
+from particlesim.vec import add, along, cross, dot, norm, put, row, row4, scaled, sub, vector
 
 # Trials of the root finder, which needs about ten; rounding of the separation could keep it busy for ever.
 _MAX_TRIES = 100
@@ -106,7 +106,7 @@ def _middle(points, count):
 @kernel
 def _resting_speed(world, constants, i):
     """Speed below which an impact under gravity keeps its energy (see RESTING_DROP) [m/s]."""
-    g = norm((world.gravity[0], world.gravity[1], world.gravity[2]))
+    g = norm(vector(world.gravity))
     return math.sqrt(2.0 * g * RESTING_DROP * constants.inradius[i])
 
 
@@ -143,7 +143,7 @@ def _answer_patch(world, constants, state, i, j, offset, normal, points, count, 
         if j >= 0:
             tally.virial[0] += impulse * dot(offset, normal)
         else:
-            tally.wall_impulse[-1 - j] += impulse
+            tally.wall_impulse[wall_of_partner(j)] += impulse
         answered = True
     if answered:
         tally.impacts[0] += 1

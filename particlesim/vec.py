@@ -16,6 +16,12 @@ def row(array, index):
 
 
 @kernel
+def vector(array):
+    """A (3,) array as a vector."""
+    return array[0], array[1], array[2]
+
+
+@kernel
 def row4(array, index):
     """Quaternion number ``index`` of an (n, 4) array."""
     return array[index, 0], array[index, 1], array[index, 2], array[index, 3]

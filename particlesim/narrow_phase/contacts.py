@@ -19,6 +19,12 @@ def wall_as_partner(wall):
     return -1 - wall
 
 
+@kernel
+def wall_of_partner(partner):
+    """The wall that a partner below 0 stands for."""
+    return -1 - partner
+
+
 @kernel(inline=True)
 def contact_between(table, world, constants, i, j, position_i, turn_i, position_j, turn_j, points):
     """Separation, normal, offset and number of contact points of particle i and partner j at the given poses.
@@ -27,9 +33,9 @@ def contact_between(table, world, constants, i, j, position_i, turn_i, position_
     """
     if j < 0:
         separation, count = wall_contact(
-            table, world, -1 - j, constants.shape[i], constants.size[i], turn_i, position_i, points
+            table, world, wall_of_partner(j), constants.shape[i], constants.size[i], turn_i, position_i, points
         )
-        return separation, wall_normal(-1 - j), (0.0, 0.0, 0.0), count
+        return separation, wall_normal(wall_of_partner(j)), (0.0, 0.0, 0.0), count
     offset = nearest_image(sub(position_j, position_i), world.period)
     separation, normal, count = pair_contact(
         table,

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import (
     AfterValidator,
+    BeforeValidator,
     Discriminator,
     Field,
     Tag,
@@ -278,27 +279,16 @@ class SpinUniform(Model):
 _VECTOR_OR_TABLE = 'a list of 3 numbers, [x, y, z], or a table such as { kind = "maxwell", temperature = 1 }'
 _Velocities = Annotated[Rest | Maxwell | UniformSpeed | FixedVelocity | RadialVelocity, Field(discriminator="kind")]
 _Spins = Annotated[Rest | SpinMaxwell | SpinUniform | FixedVelocity, Field(discriminator="kind")]
-Velocity = Annotated[
-    _Velocities,
-    shorthand(
-        _VECTOR_OR_TABLE,
-        _Velocities | Vector | Literal["rest"],
-        bare=(list, tuple, np.ndarray),
-        table=("fixed", "vector"),
-    ),
-]
-Spin = Annotated[
-    _Spins,
-    shorthand(
-        _VECTOR_OR_TABLE,
-        _Spins | Vector | Literal["rest"],
-        bare=(list, tuple, np.ndarray),
-        table=("fixed", "vector"),
-    ),
-]
 
 
-Count = Annotated[int, Field(ge=0, le=MAX_COUNT), whole, must_be(f"a whole number from 0 to {MAX_COUNT:,}")]
+def _or_vector(kinds: Any) -> BeforeValidator:
+    """Read a list of three numbers as the fixed one of these kinds."""
+    bare = (list, tuple, np.ndarray)
+    return shorthand(_VECTOR_OR_TABLE, kinds | Vector | Literal["rest"], bare=bare, table=("fixed", "vector"))
+
+
+Velocity = Annotated[_Velocities, _or_vector(_Velocities)]
+Spin = Annotated[_Spins, _or_vector(_Spins)]
 
 
 class Group(Model):
