@@ -12,10 +12,12 @@ OPEN = 2
 # The six walls in the order of the ledger's wall impulses.
 WALL_NAMES = ("-x", "+x", "-y", "+y", "-z", "+z")
 
-# A particle's surface may move this fraction of its inscribed radius in one automatic time step.  Two particles
-# then approach by at most a fifth of the sum of their inscribed radii, so they cannot pass through each other
-# unnoticed, and an impact is always bracketed by the start and the end of the step that found it.
-STEP_FRACTION = 0.2
+# In an automatic time step the surfaces of particles move by this fraction of their inscribed radii on average. It
+# decides how often neighbours are looked up and how much hangs together, not what happens: impacts have their own times.
+STEP_FRACTION = 0.15
+
+# A time step in which they would move farther than this is taken in several stretches.
+LONGEST_STRETCH = 0.3
 
 # Two faces, or an edge and a face, closer to parallel than this touch along a patch, not at a point [sine of the
 # angle].  Rounding turns a face by about 1e-15; a fall of one radius at this angle shifts the contact by 1e-6 of it.
@@ -29,8 +31,16 @@ MAX_MANIFOLD = 8
 # is a tremble of a thousandth of its size that neither gains nor loses energy; it does not sink.
 RESTING_DROP = 1e-3
 
-# Rounds of impacts within one time step before what still approaches is left to the next step and counted.
-MAX_ROUNDS = 200
+# Impacts that hang together within one stretch of time, for each of their particles, before what still approaches is
+# left to the next one and counted.
+MAX_IMPACTS = 1000
+
+# Times that islands are joined within one stretch of time before it is tried in two halves.
+MAX_ROUNDS = 40
+
+# Impacts of the same particles that are apart by less than this fraction of a stretch of time happen at once: some
+# digits above the rounding of times, and the way made meanwhile is less than 1e-10 of a size.
+SIMULTANEOUS = 1e-12
 
 # Impulses given to one patch in one impact: its middle, then whichever corner still approaches.
 MAX_PATCH_IMPULSES = 64
@@ -41,3 +51,12 @@ APPROACH_TOLERANCE = 1e-12
 # An impact is placed where the separation is between 0 and this fraction of the particles' sizes: an order above the
 # rounding of positions in a world a thousand sizes wide, so that the particles are apart when they go on.
 IMPACT_TOLERANCE = 1e-12
+
+# Bodies that touch and part may sink into each other by this fraction of their sizes before they count as meeting
+# again: it bounds the number of impacts between two that roll over each other, and is a tenth of what a hull may
+# overlap at a frame.
+SINKING = 1e-7
+
+# A particle may get this fraction of its radius away from where it was when its neighbours were looked up, and half
+# as far again as it flies in one stretch of time, before they are looked up anew.
+LEASH = 0.3

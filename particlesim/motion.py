@@ -8,17 +8,13 @@ import math
 
 import numpy as np
 
-from particlesim.bounds import particle_extent
-from particlesim.constants import STEP_FRACTION
 from particlesim.jit import kernel
 from particlesim.vec import (
-    add,
     along,
     cross,
     dot,
     norm,
     put,
-    put4,
     quaternion_of,
     quaternion_product,
     rotate,
@@ -27,7 +23,6 @@ from particlesim.vec import (
     row4,
     scaled,
     unit_quaternion,
-    vector,
 )
 
 # Moments of inertia closer than this fraction of each other are equal: the body is a symmetric top.
@@ -184,84 +179,3 @@ def free_path(position, turn, velocity, momentum, moments, gravity, time):
     """Position, orientation and velocity of a particle after ``time`` [s] of either sign."""
     position = along(along(position, velocity, time), gravity, 0.5 * time * time)
     return position, free_rotation(turn, momentum, moments, time), along(velocity, gravity, time)
-
-
-@kernel
-def path_of(constants, state, world, i, time):
-    """Position, orientation and velocity of particle ``i`` after ``time`` [s] of either sign."""
-    return free_path(
-        row(state.position, i),
-        row4(state.orientation, i),
-        row(state.velocity, i),
-        row(state.angular_momentum, i),
-        row(constants.inertia, i),
-        vector(world.gravity),
-        time,
-    )
-
-
-@kernel
-def move(constants, state, world, i, time):
-    """Move particle ``i`` along its free path."""
-    position, turn, velocity = path_of(constants, state, world, i, time)
-    put(state.position, i, position)
-    put4(state.orientation, i, turn)
-    put(state.velocity, i, velocity)
-
-
-@kernel
-def _turns_round(position, lower, period):
-    """How often a coordinate has gone round a periodic axis; 0 on any other."""
-    return math.floor((position - lower) / period) if period > 0.0 else 0
-
-
-@kernel
-def advance(table, constants, state, world, time, lower, upper, first, last):
-    """Move particles ``first .. last`` along their free paths for ``time`` [s] and write their boxes.
-
-    Particles that leave a periodic world come back on the other side. The boxes are wide enough for a rebound.
-    """
-    # Taken out of their structs once: each access counts references, which costs more than the arithmetic.
-    position, orientation, velocity = state.position, state.orientation, state.velocity
-    momentum, image, inertia = state.angular_momentum, state.image, constants.inertia
-    shape, size, inradius = constants.shape, constants.size, constants.inradius
-    kind, vertices, start = table.kind, table.vertex, table.vertex_start
-    gravity, corner, period = vector(world.gravity), world.lower, world.period
-    for i in range(first, last):
-        x, q, v = free_path(
-            row(position, i), row4(orientation, i), row(velocity, i), row(momentum, i), row(inertia, i), gravity, time
-        )
-        for axis in range(3):
-            image[i, axis] += _turns_round(x[axis], corner[axis], period[axis])
-        x = (
-            x[0] - period[0] * _turns_round(x[0], corner[0], period[0]),
-            x[1] - period[1] * _turns_round(x[1], corner[1], period[1]),
-            x[2] - period[2] * _turns_round(x[2], corner[2], period[2]),
-        )
-        put(position, i, x)
-        put4(orientation, i, q)
-        put(velocity, i, v)
-        below, above = particle_extent(kind, vertices, start, shape[i], size[i], q)
-        margin = STEP_FRACTION * inradius[i]
-        put(lower, i, add(x, (below[0] - margin, below[1] - margin, below[2] - margin)))
-        put(upper, i, add(x, (above[0] + margin, above[1] + margin, above[2] + margin)))
-
-
-@kernel
-def longest_step(constants, state, world):
-    """The longest time [s] in which no particle's surface moves more than STEP_FRACTION of its inscribed radius.
-
-    The surface moves at most (|v| + |w| R) t + g t^2 / 2; infinite if nothing moves and nothing pulls.
-    """
-    velocity, orientation, momentum = state.velocity, state.orientation, state.angular_momentum
-    inertia, radius, inradius = constants.inertia, constants.radius, constants.inradius
-    g = norm(vector(world.gravity))
-    longest = math.inf
-    for i in range(len(radius)):
-        spin = spin_of(row4(orientation, i), row(momentum, i), row(inertia, i))
-        speed = norm(row(velocity, i)) + norm(spin) * radius[i]
-        room = STEP_FRACTION * inradius[i]
-        denominator = speed + math.sqrt(speed * speed + 2.0 * g * room)
-        if denominator > 0.0:
-            longest = min(longest, 2.0 * room / denominator)
-    return longest

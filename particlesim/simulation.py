@@ -1,4 +1,4 @@
-"""The loop: advance, find pairs, find contacts, respond."""
+"""The loop: one time step after another, and what there is to see in between."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from particlesim.broad_phase import METHODS
 from particlesim.build import build
-from particlesim.constants import MAX_ROUNDS
-from particlesim.crew import Crew, use_threads
+from particlesim.constants import STEP_FRACTION
+from particlesim.crew import use_threads
+from particlesim.impacts import Flight
 from particlesim.ledger import Ledger, sums
-from particlesim.motion import advance, longest_step, spins
-from particlesim.narrow_phase.contacts import deepest_overlap, touching_pairs, touching_walls
-from particlesim.response import Tally, respond, times_since_impact
+from particlesim.motion import spins
+from particlesim.narrow_phase.contacts import deepest_overlap
 from particlesim.scene import Scene
 from particlesim.state import Particles
 from particlesim.trajectory import Frame, Header
@@ -42,15 +42,13 @@ class Simulation:
         self._find_pairs = METHODS[broad_phase or chosen.kind]
         self._parameters = chosen.model_dump(exclude={"kind"}) if broad_phase in (None, chosen.kind) else {}
         self._frame_time = 1.0 / scene.movie.fps
-        n = len(self.constants.mass)
-        self._lower, self._upper = np.empty((n, 3)), np.empty((n, 3))
-        self._clock = np.empty(n)
-        self._moved = np.empty(n, dtype=np.bool_)
-        self._tally = Tally(np.zeros(1, dtype=np.int64), np.zeros(1), np.zeros(6))
-        self._pairs_tested = self._candidate_pairs = self._unresolved = self.steps = 0
+        self._flight = Flight(self.table, self.world, self.constants, self.state, self._candidate_pairs)
+        self.steps = 0
         self.time = 0.0
         self.time_step = self.next_time_step()
-        self._advance(0.0)
+
+    def _candidate_pairs(self, lower: np.ndarray, upper: np.ndarray, period: np.ndarray) -> tuple[np.ndarray, int]:
+        return self._find_pairs(lower, upper, period, **self._parameters)
 
     # ---- going forward -------------------------------------------------------------------------------------------
 
@@ -74,49 +72,21 @@ class Simulation:
                 self.time = end
 
     def next_time_step(self) -> float:
-        """The scene's time step, or the longest that lets nothing tunnel; at most one frame [s]."""
+        """The scene's time step, or one in which particles move a little (STEP_FRACTION); at most one frame [s].
+
+        It does not decide what happens: impacts are placed at their own times within it.
+        """
         if self.scene.solver.time_step != "auto":
             return self.scene.solver.time_step
-        return min(longest_step(self.constants, self.state, self.world), self._frame_time)
+        return min(self._flight.longest_stretch(STEP_FRACTION), self._frame_time)
 
     def step(self, time_step: float | None = None) -> None:
         """One time step [s], the automatic one if not given."""
         use_threads(self._threads)
         self.time_step = self.next_time_step() if time_step is None else time_step
-        self._advance(self.time_step)
-        self._respond()
+        self._flight.advance(self.time_step)
         self.time += self.time_step
         self.steps += 1
-
-    def _advance(self, time_step: float) -> None:
-        """Move every particle along its free path and find the candidate pairs at its end."""
-        where = self.table, self.constants, self.state, self.world
-        with Crew(len(self._clock)) as crew:
-            crew.each(
-                lambda _, first, last: advance(*where, time_step, self._lower, self._upper, first, last),
-                len(self._clock),
-            )
-        self._pairs, tested = self._find_pairs(self._lower, self._upper, self.world.period, **self._parameters)
-        self._pairs_tested += int(tested)
-        self._candidate_pairs += len(self._pairs)
-
-    def _respond(self) -> None:
-        """Answer the impacts of the step, round by round, until nothing that touches approaches."""
-        where = self.table, self.world, self.constants, self.state
-        self._clock[:] = self.time_step
-        self._moved[:] = True
-        for _ in range(MAX_ROUNDS):
-            pairs = touching_pairs(*where, self._pairs, self._moved)
-            walls = touching_walls(*where, self._moved)
-            if not len(pairs) and not len(walls):
-                return
-            contacts = np.concatenate([pairs, walls])
-            earlier = times_since_impact(*where, contacts, self._clock)
-            # Stable: impacts at the same moment are taken in the canonical order of their pairs.
-            order = np.argsort(-earlier, kind="stable")
-            if not respond(*where, contacts, earlier, order, self._clock, self._tally, self._moved):
-                return
-        self._unresolved += 1
 
     # ---- looking ---------------------------------------------------------------------------------------------------
 
@@ -128,6 +98,7 @@ class Simulation:
     @property
     def ledger(self) -> Ledger:
         """Sums over all particles now, and counts since the start."""
+        counts = self._flight.counts
         (translational, rotational, potential), momentum, angular = sums(self.world, self.constants, self.state)
         return Ledger(
             time=self.time,
@@ -138,13 +109,15 @@ class Simulation:
             potential=float(potential),
             momentum=momentum,
             angular_momentum=angular,
-            impacts=int(self._tally.impacts[0]),
-            pairs_tested=self._pairs_tested,
-            candidate_pairs=self._candidate_pairs,
-            unresolved=self._unresolved,
-            virial=float(self._tally.virial[0]),
-            wall_impulse=self._tally.wall_impulse.copy(),
-            largest_overlap=float(deepest_overlap(self.table, self.world, self.constants, self.state, self._pairs)),
+            impacts=counts.impacts,
+            pairs_tested=counts.pairs_tested,
+            candidate_pairs=counts.candidate_pairs,
+            unresolved=counts.unresolved,
+            virial=counts.virial,
+            wall_impulse=counts.wall_impulse.copy(),
+            largest_overlap=float(
+                deepest_overlap(self.table, self.world, self.constants, self.state, self._flight.pairs)
+            ),
         )
 
     @property

@@ -20,9 +20,9 @@ def _vertices(table, shape):
 
 
 @kernel(inline=True)
-def hulls_overlap(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset):
-    """Whether two hulls touch or overlap."""
-    touching = _TOUCHING * (table.radius[shape_a] * size_a + table.radius[shape_b] * size_b)
+def hulls_nearer(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, distance):
+    """Whether two hulls are nearer than ``distance`` [m]; 0 asks whether they touch or overlap."""
+    touching = distance + _TOUCHING * (table.radius[shape_a] * size_a + table.radius[shape_b] * size_b)
     return not hulls_apart(
         _vertices(table, shape_a),
         size_a,
@@ -36,9 +36,8 @@ def hulls_overlap(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offse
 
 
 @kernel(inline=True)
-def hull_hull(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
-    """Separation, normal from a to b and number of contact points of hull b at ``offset`` from hull a."""
-    matrix_a, matrix_b = matrix_of(turn_a), matrix_of(turn_b)
+def hull_separation(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset):
+    """Separation, normal from a to b and half way between the nearest points, of hull b at ``offset`` from hull a."""
     joined = _JOINED * (table.radius[shape_a] * size_a + table.radius[shape_b] * size_b)
     separation, apart, point_a, point_b = hull_distance(
         _vertices(table, shape_a),
@@ -55,7 +54,14 @@ def hull_hull(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, p
         normal = scaled(apart, 1.0 / norm(apart))
     else:
         separation, normal = hull_depth(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset)
-    middle = scaled(add(point_a, point_b), 0.5)
+    return separation, normal, scaled(add(point_a, point_b), 0.5)
+
+
+@kernel(inline=True)
+def hull_hull(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
+    """Separation, normal from a to b and number of contact points of hull b at ``offset`` from hull a."""
+    matrix_a, matrix_b = matrix_of(turn_a), matrix_of(turn_b)
+    separation, normal, middle = hull_separation(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset)
     count = hull_patch(
         table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset, normal, separation, middle, points
     )

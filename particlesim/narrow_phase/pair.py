@@ -2,10 +2,10 @@
 
 from particlesim.constants import SPHERE
 from particlesim.jit import kernel
-from particlesim.narrow_phase.hull_hull import hull_hull, hulls_overlap
+from particlesim.narrow_phase.hull_hull import hull_hull, hull_separation, hulls_nearer
 from particlesim.narrow_phase.sphere_hull import hull_sphere
 from particlesim.narrow_phase.sphere_sphere import sphere_sphere
-from particlesim.vec import add, put, row, scaled
+from particlesim.vec import add, matrix_of, put, row, scaled
 
 
 @kernel
@@ -21,6 +21,20 @@ def nearest_image(offset, period):
     return x, y, z
 
 
+@kernel(inline=True)
+def _sphere_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
+    """The contact of two particles of which one at least is a sphere (see pair_contact)."""
+    if table.kind[shape_a] != SPHERE:
+        separation, normal, count = hull_sphere(table, shape_a, size_a, turn_a, size_b, offset, points)
+    elif table.kind[shape_b] != SPHERE:
+        separation, normal, count = hull_sphere(table, shape_b, size_b, turn_b, size_a, scaled(offset, -1.0), points)
+        normal = scaled(normal, -1.0)
+        put(points, 0, add(offset, row(points, 0)))
+    else:
+        separation, normal, count = sphere_sphere(size_a, size_b, offset, points)
+    return separation, normal, count
+
+
 @kernel
 def pair_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
     """Separation (negative: overlap), unit normal from a to b, and number of contact points written.
@@ -28,15 +42,21 @@ def pair_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset
     ``turn`` are orientations, ``offset`` is b's centroid from a's; points are relative to a's centroid, half way
     between the two surfaces.
     """
-    if table.kind[shape_a] == SPHERE:
-        if table.kind[shape_b] == SPHERE:
-            return sphere_sphere(size_a, size_b, offset, points)
-        separation, normal, count = hull_sphere(table, shape_b, size_b, turn_b, size_a, scaled(offset, -1.0), points)
-        put(points, 0, add(offset, row(points, 0)))
-        return separation, scaled(normal, -1.0), count
-    if table.kind[shape_b] == SPHERE:
-        return hull_sphere(table, shape_a, size_a, turn_a, size_b, offset, points)
+    if table.kind[shape_a] == SPHERE or table.kind[shape_b] == SPHERE:
+        return _sphere_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points)
     return hull_hull(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points)
+
+
+@kernel(inline=True)
+def pair_separation(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
+    """Separation and normal as of pair_contact, without the corners of the patch; ``points`` is scratch."""
+    if table.kind[shape_a] == SPHERE or table.kind[shape_b] == SPHERE:
+        separation, normal, _ = _sphere_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points)
+    else:
+        separation, normal, _ = hull_separation(
+            table, shape_a, size_a, matrix_of(turn_a), shape_b, size_b, matrix_of(turn_b), offset
+        )
+    return separation, normal
 
 
 @kernel(inline=True)
@@ -46,5 +66,5 @@ def pair_overlaps(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offse
         separation, _, _ = pair_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points)
         overlap = separation <= 0.0
     else:
-        overlap = hulls_overlap(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset)
+        overlap = hulls_nearer(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, 0.0)
     return overlap

@@ -33,7 +33,7 @@ def _nearest_on_outline(vertices, size, loop, first, last, normal, centre):
     return over, nearest, best
 
 
-@kernel(inline=True)
+@kernel
 def hull_sphere(table, shape, size, turn, diameter, offset, points):
     """Separation, normal from hull to sphere and one contact point, for a sphere at ``offset`` from a hull."""
     # Taken out of their struct once: each access counts references, which costs more than the arithmetic.

@@ -18,27 +18,37 @@ def wall_normal(wall):
     return (sign if axis == 0 else 0.0), (sign if axis == 1 else 0.0), (sign if axis == 2 else 0.0)
 
 
+@kernel(inline=True)
+def wall_separation(table, lower, upper, wall, shape, size, turn, position):
+    """Separation of a particle from a wall of the world with these bounds."""
+    axis, sign = wall // 2, 2.0 * (wall % 2) - 1.0
+    room = sign * ((upper[axis] if wall % 2 else lower[axis]) - position[axis])
+    if table.kind[shape] == SPHERE:
+        reach = 0.5
+    else:
+        matrix = matrix_of(turn)
+        outwards = wall_normal(wall)
+        vertex = table.vertex
+        reach = -math.inf
+        for v in range(table.vertex_start[shape], table.vertex_start[shape + 1]):
+            reach = max(reach, dot(outwards, apply(matrix, row(vertex, v))))
+    return room - size * reach
+
+
 @kernel
 def wall_contact(table, world, wall, shape, size, turn, position, points):
     """Separation of a particle from a wall and number of contact points, relative to the particle's centroid.
 
     The points are those of the particle: the corners of the face, edge or vertex that faces the wall.
     """
-    axis, sign = wall // 2, 2.0 * (wall % 2) - 1.0
-    plane = world.upper[axis] if wall % 2 else world.lower[axis]
-    room = sign * (plane - position[axis])
+    separation = wall_separation(table, world.lower, world.upper, wall, shape, size, turn, position)
     outwards = wall_normal(wall)
     if table.kind[shape] == SPHERE:
         put(points, 0, scaled(outwards, 0.5 * size))
-        return room - 0.5 * size, 1
-    matrix = matrix_of(turn)
-    farthest = -math.inf
-    vertex = table.vertex
-    for v in range(table.vertex_start[shape], table.vertex_start[shape + 1]):
-        farthest = max(farthest, dot(outwards, apply(matrix, row(vertex, v))))
+        return separation, 1
     feature = np.empty((MAX_CORNERS, 3))
-    count, _ = facing_feature(table, shape, size, matrix, (0.0, 0.0, 0.0), outwards, feature)
+    count, _ = facing_feature(table, shape, size, matrix_of(turn), (0.0, 0.0, 0.0), outwards, feature)
     kept = min(count, MAX_MANIFOLD)
     for k in range(kept):
         put(points, k, row(feature, k * count // kept))
-    return room - size * farthest, kept
+    return separation, kept

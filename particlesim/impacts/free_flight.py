@@ -1,0 +1,113 @@
+"""What concerns every particle in every stretch of time, whether it meets anything or not."""
+
+from __future__ import annotations
+
+import math
+
+from particlesim.jit import kernel
+from particlesim.motion import free_path, spin_of
+from particlesim.narrow_phase.pair import nearest_image
+from particlesim.vec import dot, norm, put, put4, row, row4, sub, vector
+
+
+@kernel
+def _turns_round(position, lower, period):
+    """How often a coordinate has gone round a periodic axis; 0 on any other."""
+    return math.floor((position - lower) / period) if period > 0.0 else 0
+
+
+@kernel
+def fly_on(constants, state, world, clock, acceleration, anchor, leash, duration, first, last):
+    """Bring particles ``first .. last`` from their clocks to ``duration`` [s] along their free paths.
+
+    Particles that leave a periodic world come back on the other side. Returns for how long [s] all of them certainly
+    stay on their leashes, going straight on; -1 if one is not on its leash now.
+    """
+    # Taken out of their structs once: each access counts references, which costs more than the arithmetic.
+    position, orientation, velocity = state.position, state.orientation, state.velocity
+    momentum, image, inertia = state.angular_momentum, state.image, constants.inertia
+    corner, period = world.lower, world.period
+    longest = math.inf
+    for i in range(first, last):
+        pull = row(acceleration, i)
+        x, q, v = free_path(
+            row(position, i),
+            row4(orientation, i),
+            row(velocity, i),
+            row(momentum, i),
+            row(inertia, i),
+            pull,
+            duration - clock[i],
+        )
+        for axis in range(3):
+            image[i, axis] += _turns_round(x[axis], corner[axis], period[axis])
+        x = (
+            x[0] - period[0] * _turns_round(x[0], corner[0], period[0]),
+            x[1] - period[1] * _turns_round(x[1], corner[1], period[1]),
+            x[2] - period[2] * _turns_round(x[2], corner[2], period[2]),
+        )
+        put(position, i, x)
+        put4(orientation, i, q)
+        put(velocity, i, v)
+        room = leash[i] - norm(nearest_image(sub(x, row(anchor, i)), period))
+        if room < 0.0:
+            longest = -1.0
+        else:
+            # room = speed t + pull t^2 / 2
+            speed = norm(v)
+            denominator = speed + math.sqrt(speed * speed + 2.0 * norm(pull) * room)
+            if denominator > 0.0:
+                longest = min(longest, 2.0 * room / denominator)
+    return longest
+
+
+@kernel
+def all_on_leash(log_piece, particle, state, clock, acceleration, anchor, leash, period, duration, first_piece, met):
+    """Whether particles that met something stayed on their leashes: at each impact, and flying on to the end.
+
+    A parabola between two of these points is farther out than both by at most a t^2 / 8.
+    """
+    for m in range(first_piece, len(particle)):
+        i = particle[m]
+        where = log_piece[m, 1], log_piece[m, 2], log_piece[m, 3]
+        bulge = 0.125 * norm(row(acceleration, i)) * duration * duration
+        if norm(nearest_image(sub(where, row(anchor, i)), period)) + bulge > leash[i]:
+            return False
+    for i in met:
+        time = duration - clock[i]
+        x, v, a = row(state.position, i), row(state.velocity, i), row(acceleration, i)
+        way = (
+            v[0] * time + 0.5 * a[0] * time * time,
+            v[1] * time + 0.5 * a[1] * time * time,
+            v[2] * time + 0.5 * a[2] * time * time,
+        )
+        end = x[0] + way[0], x[1] + way[1], x[2] + way[2]
+        bulge = 0.125 * norm(a) * time * time
+        if norm(nearest_image(sub(end, row(anchor, i)), period)) + bulge > leash[i]:
+            return False
+    return True
+
+
+@kernel
+def paces(constants, state, world, out, rows):
+    """Sums over blocks of ``rows`` particles: how fast surfaces move, and gravity pulls, in inscribed radii.
+
+    ``out`` (blocks, 2) [1/s], [1/s^2]. Returns the largest speed [m/s].
+    """
+    velocity, orientation, momentum = state.velocity, state.orientation, state.angular_momentum
+    inertia, radius, inradius = constants.inertia, constants.radius, constants.inradius
+    g = norm(vector(world.gravity))
+    fastest = 0.0
+    for block in range(len(out)):
+        pace = pull = 0.0
+        for i in range(block * rows, min((block + 1) * rows, len(radius))):
+            speed2 = dot(row(velocity, i), row(velocity, i))
+            own = row(momentum, i)
+            fastest = max(fastest, speed2)
+            speed = math.sqrt(speed2)
+            if dot(own, own) > 0.0:
+                speed += norm(spin_of(row4(orientation, i), own, row(inertia, i))) * radius[i]
+            pace += speed / inradius[i]
+            pull += g / inradius[i]
+        out[block, 0], out[block, 1] = pace, pull
+    return math.sqrt(fastest)

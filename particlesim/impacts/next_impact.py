@@ -1,0 +1,139 @@
+"""The next impact of a particle with another or with a wall, along the paths they are on."""
+
+import math
+
+from particlesim.constants import APPROACH_TOLERANCE, IMPACT_TOLERANCE, SPHERE, WALL
+from particlesim.impacts.time_of_impact import first_touch, sphere_meets_wall, spheres_meet, spheres_near
+from particlesim.jit import kernel
+from particlesim.motion import free_path, spin_of
+from particlesim.narrow_phase.pair import nearest_image, pair_contact
+from particlesim.narrow_phase.walls import wall_contact, wall_normal
+from particlesim.vec import add, cross, dot, norm, row, scaled, sub
+
+
+@kernel
+def later(path, moments, time):
+    """The path (position, orientation, velocity, momentum, acceleration) as seen ``time`` seconds later."""
+    position, turn, velocity, momentum, acceleration = path
+    if time == 0.0:
+        return path
+    position, turn, velocity = free_path(position, turn, velocity, momentum, moments, acceleration, time)
+    return position, turn, velocity, momentum, acceleration
+
+
+@kernel
+def velocity_at(path, moments, arm):
+    """Velocity of the point of a body at ``arm`` from its centroid."""
+    return add(path[2], cross(spin_of(path[1], path[3], moments), arm))
+
+
+@kernel(inline=True)
+def _touches(table, world, body_i, path_i, body_j, path_j, wall, points):
+    """Whether two bodies touch, and whether any point of their contact approaches."""
+    if wall >= 0:
+        separation, count = wall_contact(table, world, wall, body_i[0], body_i[1], path_i[1], path_i[0], points)
+        normal, offset = wall_normal(wall), (0.0, 0.0, 0.0)
+        sizes = body_i[1]
+    else:
+        offset = nearest_image(sub(path_j[0], path_i[0]), world.period)
+        separation, normal, count = pair_contact(
+            table, body_i[0], body_i[1], path_i[1], body_j[0], body_j[1], path_j[1], offset, points
+        )
+        sizes = body_i[1] + body_j[1]
+    touching = separation <= IMPACT_TOLERANCE * sizes
+    approaching = False
+    for k in range(count if touching else 0):
+        of_i = velocity_at(path_i, body_i[3], row(points, k))
+        parting, speed = -dot(of_i, normal), norm(of_i)
+        if wall < 0:
+            of_j = velocity_at(path_j, body_j[3], sub(row(points, k), offset))
+            parting += dot(of_j, normal)
+            speed += norm(of_j)
+        approaching = approaching or parting < -APPROACH_TOLERANCE * speed
+    return touching, approaching
+
+
+@kernel
+def _hull_meets(table, world, body_i, path_i, body_j, path_j, wall, start, end, points):
+    """When two bodies of which one at least is a hull meet in ``start .. end``, on paths given at time 0."""
+    time = first_touch(
+        table, world.lower, world.upper, world.period, body_i, path_i, body_j, path_j, wall, start, end, False, points
+    )
+    if time == start:
+        then_i = later(path_i, body_i[3], start)
+        then_j = later(path_j, body_j[3], start)
+        touching, approaching = _touches(table, world, body_i, then_i, body_j, then_j, wall, points)
+        if touching and not approaching:
+            time = first_touch(
+                table,
+                world.lower,
+                world.upper,
+                world.period,
+                body_i,
+                path_i,
+                body_j,
+                path_j,
+                wall,
+                start,
+                end,
+                True,
+                points,
+            )
+    return time
+
+
+@kernel(inline=True)
+def body_of(constants, i):
+    """Shape, size, radius and moments of particle ``i``."""
+    return constants.shape[i], constants.size[i], constants.radius[i], row(constants.inertia, i)
+
+
+@kernel(inline=True)
+def _spheres_meet(body_i, path_i, body_j, path_j, offset, duration):
+    """When two spheres under the same acceleration meet, at once only if they approach by more than rounding."""
+    velocity = sub(path_j[2], path_i[2])
+    reach = body_i[2] + body_j[2]
+    time = spheres_meet(offset, velocity, reach, duration)
+    if time == 0.0:
+        of_i = velocity_at(path_i, body_i[3], scaled(offset, body_i[2] / reach))
+        of_j = velocity_at(path_j, body_j[3], scaled(offset, -body_j[2] / reach))
+        if dot(offset, velocity) >= -APPROACH_TOLERANCE * (norm(of_i) + norm(of_j)) * norm(offset):
+            time = math.inf
+    return time
+
+
+@kernel(inline=True)
+def pair_meets(table, world, kind_i, body_i, path_i, kind_j, body_j, path_j, duration, points):
+    """When two particles meet within ``duration`` on paths given at time 0; inf if they do not."""
+    offset = nearest_image(sub(path_j[0], path_i[0]), world.period)
+    acceleration = sub(path_j[4], path_i[4])
+    if kind_i == SPHERE and kind_j == SPHERE and dot(acceleration, acceleration) == 0.0:
+        time = _spheres_meet(body_i, path_i, body_j, path_j, offset, duration)
+    else:
+        # Bounding spheres first: larger by what the acceleration could do.
+        reach = body_i[2] + body_j[2] + 0.5 * norm(acceleration) * duration * duration
+        time, end = spheres_near(offset, sub(path_j[2], path_i[2]), reach, duration)
+        if time < math.inf:
+            time = _hull_meets(table, world, body_i, path_i, body_j, path_j, -1, time, end, points)
+    return time
+
+
+@kernel(inline=True)
+def wall_meets(table, world, lower, upper, boundary, kind, body, path, wall, duration, points):
+    """When a particle meets a wall within ``duration`` on a path given at time 0; inf if it does not."""
+    time = math.inf
+    axis = wall // 2
+    if boundary[axis] == WALL:
+        normal = wall_normal(wall)
+        room = (upper[axis] - path[0][axis] if wall % 2 else path[0][axis] - lower[axis]) - body[2]
+        speed = dot(path[2], normal)
+        time = sphere_meets_wall(room, speed, dot(path[4], normal), duration)
+        if kind != SPHERE:
+            if time < math.inf or room <= 0.0:
+                start = time if room > 0.0 else 0.0
+                time = _hull_meets(table, world, body, path, body, path, wall, start, duration, points)
+        elif time == 0.0:
+            surface = velocity_at(path, body[3], scaled(normal, body[2]))
+            if speed <= APPROACH_TOLERANCE * norm(surface):
+                time = math.inf
+    return time

@@ -1,0 +1,200 @@
+"""The impulses that answer impacts at one moment.
+
+Every impulse acts equally and oppositely at one point, so momentum and angular momentum are kept whatever its size;
+its size keeps the kinetic energy when the restitution is 1. Contacts of one moment that share particles are answered
+together: each gets the impulse that would stop its own approach, and all are stretched by one factor, so that the
+energy is what the restitution says. What is symmetric stays symmetric, and where only one contact approaches (a row
+of balls) it is answered by itself, one after the other.
+"""
+
+import math
+
+import numpy as np
+
+from particlesim.constants import APPROACH_TOLERANCE, MAX_MANIFOLD, MAX_PATCH_IMPULSES, RESTING_DROP
+from particlesim.jit import kernel
+from particlesim.motion import particle_spin, spin_of
+from particlesim.narrow_phase.contacts import contact_now, wall_of_partner
+from particlesim.vec import add, along, cross, dot, norm, put, row, row4, scaled, sub, vector
+
+# Columns of an island's tally: impacts, the virial, then the impulse on each of six walls.
+IMPACTS, VIRIAL, WALLS = 0, 1, 2
+TALLY = 8
+
+
+# ---- one impulse -------------------------------------------------------------------------------------------------
+
+
+@kernel
+def _point_velocity(constants, state, i, arm):
+    """Velocity of the point of particle ``i`` at ``arm`` from its centroid."""
+    return add(row(state.velocity, i), cross(particle_spin(constants, state, i), arm))
+
+
+@kernel
+def _inverse_mass_at(constants, state, i, arm, normal):
+    """How much speed along ``normal`` a unit impulse along it gives the point at ``arm`` [1/kg].
+
+    1/m + n . ((I^-1 (r x n)) x r) (D. Baraff, SIGGRAPH 1997 course notes, Rigid Body Simulation II, eq. 8-18)
+    """
+    twist = cross(arm, normal)
+    spin = spin_of(row4(state.orientation, i), twist, row(constants.inertia, i))
+    return 1.0 / constants.mass[i] + dot(twist, spin)
+
+
+@kernel
+def _approach(constants, state, i, j, point, offset, normal):
+    """Speed at which the partners part at a point (negative: they approach), and the speed that counts as none."""
+    of_i = _point_velocity(constants, state, i, point)
+    parting = -dot(of_i, normal)
+    speed = norm(of_i)
+    if j >= 0:
+        of_j = _point_velocity(constants, state, j, sub(point, offset))
+        parting += dot(of_j, normal)
+        speed += norm(of_j)
+    return parting, APPROACH_TOLERANCE * speed
+
+
+@kernel
+def _resting_speed(world, constants, i):
+    """Speed below which an impact under gravity keeps its energy (see RESTING_DROP) [m/s]."""
+    g = norm(vector(world.gravity))
+    return math.sqrt(2.0 * g * RESTING_DROP * constants.inradius[i])
+
+
+@kernel
+def _restitution(world, constants, i, j):
+    """Of a pair: the smaller one; and the speed below which it does not count."""
+    if j < 0:
+        return min(constants.restitution[i], world.restitution), _resting_speed(world, constants, i)
+    resting = min(_resting_speed(world, constants, i), _resting_speed(world, constants, j))
+    return min(constants.restitution[i], constants.restitution[j]), resting
+
+
+# ---- contacts of one moment ----------------------------------------------------------------------------------------
+
+
+@kernel
+def _middle(points, count):
+    total = (0.0, 0.0, 0.0)
+    for k in range(count):
+        total = add(total, row(points, k))
+    return scaled(total, 1.0 / count)
+
+
+@kernel
+def _point_to_answer(constants, state, i, j, points, count, offset, normal):
+    """Where a contact is answered next, and how fast it parts there; 0 if it approaches nowhere.
+
+    First in the middle of its patch, then where it approaches fastest: a face that lands flat is thus pushed in its
+    middle and does not start to spin.
+    """
+    point = _middle(points, count)
+    parting, tolerance = _approach(constants, state, i, j, point, offset, normal)
+    if parting >= -tolerance:
+        parting = 0.0
+        for k in range(count):
+            at_corner, small = _approach(constants, state, i, j, row(points, k), offset, normal)
+            if at_corner < parting and at_corner < -small:
+                parting, point = at_corner, row(points, k)
+    return point, parting
+
+
+@kernel
+def _stretch(constants, state, whom, size, push, twist, work, loss, kept):
+    """The factor on all impulses that leaves the energy which the restitutions say.
+
+    Along the impulses the kinetic energy is a parabola: work s + D s^2 / 2. Its lowest point is a fully inelastic
+    impact, the mirror image of where it started an elastic one. ``loss`` and ``kept`` weigh the restitutions.
+    """
+    growth = 0.0
+    for k in range(size):
+        i = whom[k]
+        change = row(push, k)
+        momentum = row(twist, k)
+        spin = spin_of(row4(state.orientation, i), momentum, row(constants.inertia, i))
+        growth += dot(change, change) / constants.mass[i] + dot(momentum, spin)
+    return -work / growth * kept / loss
+
+
+@kernel
+def _slot(whom, size, i):
+    """Where particle ``i`` stands among those of the moment."""
+    for k in range(size):
+        if whom[k] == i:
+            return k
+    return -1
+
+
+@kernel
+def _tell(tally, j, impulse, offset, normal):
+    """Book an impulse between a particle and partner j."""
+    if j >= 0:
+        tally[VIRIAL] += impulse * dot(offset, normal)
+    else:
+        tally[WALLS + wall_of_partner(j)] += impulse
+
+
+@kernel
+def answer(table, world, constants, state, contacts, count, whom, size, tally):
+    """Answer ``count`` contacts (particle, partner) of one moment until nothing in them approaches.
+
+    ``whom`` lists the ``size`` particles in them. Returns whether anything approached at all; adds to ``tally``.
+    """
+    points = np.empty((count, MAX_MANIFOLD, 3))
+    corners = np.empty(count, dtype=np.int64)
+    normals, offsets, where = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
+    impulse = np.empty(count)
+    answered = np.empty(count, dtype=np.bool_)
+    push, twist = np.empty((size, 3)), np.empty((size, 3))
+    for c in range(count):
+        i, j = contacts[c, 0], contacts[c, 1]
+        _, normal, offset, corners[c] = contact_now(table, world, constants, state, i, j, points[c])
+        put(normals, c, normal)
+        put(offsets, c, offset)
+        answered[c] = False
+    for _ in range(MAX_PATCH_IMPULSES):
+        for k in range(size):
+            put(push, k, (0.0, 0.0, 0.0))
+            put(twist, k, (0.0, 0.0, 0.0))
+        work = loss = kept = 0.0
+        for c in range(count):
+            i, j = contacts[c, 0], contacts[c, 1]
+            normal, offset = row(normals, c), row(offsets, c)
+            point, parting = _point_to_answer(constants, state, i, j, points[c], corners[c], offset, normal)
+            impulse[c] = 0.0
+            if parting < 0.0:
+                inverse_mass = _inverse_mass_at(constants, state, i, point, normal)
+                if j >= 0:
+                    inverse_mass += _inverse_mass_at(constants, state, j, sub(point, offset), normal)
+                e, resting = _restitution(world, constants, i, j)
+                stop = -parting / inverse_mass
+                bounce = 2.0 if -parting <= resting else 1.0 + e
+                impulse[c] = bounce * stop
+                work += impulse[c] * parting
+                loss += bounce * bounce * stop * -parting
+                kept += bounce * stop * -parting
+                put(where, c, point)
+                slot = _slot(whom, size, i)
+                put(push, slot, along(row(push, slot), normal, -impulse[c]))
+                put(twist, slot, along(row(twist, slot), cross(point, normal), -impulse[c]))
+                if j >= 0:
+                    slot = _slot(whom, size, j)
+                    put(push, slot, along(row(push, slot), normal, impulse[c]))
+                    put(twist, slot, along(row(twist, slot), cross(sub(point, offset), normal), impulse[c]))
+        if work == 0.0:
+            break
+        factor = 1.0 if count == 1 else _stretch(constants, state, whom, size, push, twist, work, kept, loss)
+        for k in range(size):
+            i = whom[k]
+            put(state.velocity, i, along(row(state.velocity, i), row(push, k), factor / constants.mass[i]))
+            put(state.angular_momentum, i, along(row(state.angular_momentum, i), row(twist, k), factor))
+        for c in range(count):
+            if impulse[c] > 0.0:
+                answered[c] = True
+                _tell(tally, contacts[c, 1], factor * impulse[c], row(offsets, c), row(normals, c))
+    impacts = 0
+    for c in range(count):
+        impacts += answered[c]
+    tally[IMPACTS] += impacts
+    return impacts > 0
