@@ -13,7 +13,7 @@ OPEN = 2
 WALL_NAMES = ("-x", "+x", "-y", "+y", "-z", "+z")
 
 # In an automatic time step the surfaces of particles move by this fraction of their inscribed radii on average. It
-# decides how often neighbours are looked up and how much hangs together, not what happens: impacts have their own times.
+# decides how often neighbours are looked up and how much hangs together, not what happens: impacts have own times.
 STEP_FRACTION = 0.15
 
 # A time step in which they would move farther than this is taken in several stretches.

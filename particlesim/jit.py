@@ -16,6 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import cgutils, types
+from numba.core.imputils import impl_ret_untracked
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array
 
 _PACKAGE = Path(__file__).parent
 
@@ -63,3 +67,36 @@ def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False) 
         return numba.njit(cache=True, nogil=True, **options)(function)
     finally:
         config.CACHE_DIR = elsewhere
+
+
+def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    """An array, or a tuple with arrays in it, without what counts its references."""
+    if isinstance(kind, types.Array):
+        array = make_array(kind)(context, builder, value=value)
+        array.meminfo = cgutils.get_null_value(array.meminfo.type)
+        array.parent = cgutils.get_null_value(array.parent.type)
+        return array._getvalue()  # the way numba's own code reads it
+    if isinstance(kind, types.BaseTuple):
+        for k, element in enumerate(kind.types):
+            changed = _without_owner(context, builder, element, builder.extract_value(value, k))
+            value = builder.insert_value(value, changed, k)
+    return value
+
+
+def _borrow(typing_context: Any, thing: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return impl_ret_untracked(context, builder, thing, _without_owner(context, builder, thing, arguments[0]))
+
+    return thing(thing), generate
+
+
+def _same(thing: Any) -> Any:
+    return thing
+
+
+_config: Any = numba.config
+
+# Inside a kernel: an array or tuple (of tuples) of arrays that came as an argument, whose references are not counted
+# from here on. Counting is atomic: handing a struct of arrays to a function takes longer than moving a particle, and
+# threads that count the same arrays wait for each other. The caller of the kernel holds the arrays meanwhile.
+borrowed: Any = _same if _config.DISABLE_JIT else intrinsic(_borrow)

@@ -121,6 +121,11 @@ class Simulation:
         )
 
     @property
+    def seconds(self) -> dict[str, float]:
+        """Wall-clock time [s] spent so far on pairs, contacts, respond and advance."""
+        return dict(self._flight.seconds)
+
+    @property
     def header(self) -> Header:
         """What stays the same from frame to frame."""
         c = self.constants

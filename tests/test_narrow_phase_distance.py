@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from particlesim.constants import MAX_MANIFOLD
-from particlesim.narrow_phase.hull_hull import hulls_overlap
+from particlesim.narrow_phase.hull_hull import hulls_nearer
 from particlesim.narrow_phase.pair import pair_contact
 from particlesim.state import stack_shapes
 from tests import oracles
@@ -28,8 +28,8 @@ def contact(a, b, offset):
 
 
 def overlaps(a, b, offset):
-    return hulls_overlap.py_func(
-        TABLE, a[0], a[1], tuple(a[2].tolist()), b[0], b[1], tuple(b[2].tolist()), tuple(offset.tolist())
+    return hulls_nearer.py_func(
+        TABLE, a[0], a[1], tuple(a[2].tolist()), b[0], b[1], tuple(b[2].tolist()), tuple(offset.tolist()), 0.0
     )
 
 

@@ -12,7 +12,7 @@ from particlesim.impacts.course import NOTHING_MET, PIECE, UNCHAINED, path_of_st
 from particlesim.impacts.next_impact import body_of, pair_meets, wall_meets
 from particlesim.impacts.response import answer
 from particlesim.impacts.sieve import grown
-from particlesim.jit import kernel
+from particlesim.jit import borrowed, kernel
 from particlesim.motion import free_path
 from particlesim.narrow_phase.contacts import wall_as_partner
 from particlesim.vec import put, put4, row
@@ -172,6 +172,7 @@ def run_islands(
     (n, TALLY) of each island's first member.
     Returns the pieces of path and whose they are, and how many islands were left with impacts to answer.
     """
+    table, world, constants, state, course = borrowed((table, world, constants, state, course))
     stamp, head = course.stamp, course.head
     points = np.empty((MAX_MANIFOLD, 3))
     contacts, whom = np.empty((64, 2), dtype=np.int64), np.empty(128, dtype=np.int64)

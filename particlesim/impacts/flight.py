@@ -10,6 +10,9 @@ the order in which the islands were taken and however many threads shared them.
 from __future__ import annotations
 
 import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,6 +30,10 @@ from particlesim.state import Constants, ShapeTable, State, World
 
 # Particles whose paces are summed at a time: sums depend on the order, and must not on the number of threads.
 _ROWS = 4096
+
+
+# What the time goes into: finding neighbours, who meets whom, answering impacts, moving on.
+PHASES = ("pairs", "contacts", "respond", "advance")
 
 
 @dataclass
@@ -55,6 +62,7 @@ class Flight:
         self._first_met = np.full(count, -1, dtype=np.int64)
         self._tally = np.zeros((count, TALLY))
         self.counts = Counts()
+        self.seconds = dict.fromkeys(PHASES, 0.0)
         self._on_leash = -1.0
         self._look_around(0.0)
 
@@ -88,9 +96,16 @@ class Flight:
         for _ in range(parts):
             self._stretch(duration / parts)
 
+    @contextmanager
+    def _spent_on(self, phase: str) -> Iterator[None]:
+        begun = time.perf_counter()
+        yield
+        self.seconds[phase] += time.perf_counter() - begun
+
     def _stretch(self, duration: float) -> None:
         if duration > self._on_leash:
-            self._look_around(duration)
+            with self._spent_on("pairs"):
+                self._look_around(duration)
         if not self._follow(duration):
             # Too much hangs together: less does in half the time.
             self._stretch(0.5 * duration)
@@ -100,26 +115,30 @@ class Flight:
         """Move all on by ``duration`` [s]; False, with nothing moved, if that takes too many rounds."""
         course, state = self._course, self._state
         log = empty_log()
-        met, times = first_meetings(self._where(log), self._neighbours, duration)
+        with self._spent_on("contacts"):
+            met, times = first_meetings(self._where(log), self._neighbours, duration)
         touched = np.unique(met[met >= 0])
         starts = np.flatnonzero(np.diff(met[:, 0], prepend=-1))
         self._first_met[met[starts, 0]] = starts
         linked = met
         rounds = unfinished = 0
         while len(linked) and rounds < MAX_ROUNDS:
-            islands = unite(course.island, linked, touched)
-            rewind(course, log, state, islands.member)
-            self._tally[islands.member] = 0.0
-            first_piece = len(log.particle)
-            log, left = self._run(islands, log, met, times, duration)
-            unfinished += left
-            linked = self._missed(log, first_piece, duration)
+            with self._spent_on("respond"):
+                islands = unite(course.island, linked, touched)
+                rewind(course, log, state, islands.member)
+                self._tally[islands.member] = 0.0
+                first_piece = len(log.particle)
+                log, left = self._run(islands, log, met, times, duration)
+                unfinished += left
+            with self._spent_on("contacts"):
+                linked = self._missed(log, first_piece, duration)
             touched = np.union1d(touched, linked.ravel())
             rounds += 1
         done = not len(linked)
         if done:
             self._book(touched, unfinished)
-            self._fly_on(duration)
+            with self._spent_on("advance"):
+                self._fly_on(duration)
         else:
             rewind(course, log, state, touched)
         self._first_met[met[starts, 0]] = -1

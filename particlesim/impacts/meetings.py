@@ -12,7 +12,7 @@ from particlesim.impacts.course import Course, Log, path_of_piece, path_of_state
 from particlesim.impacts.neighbours import Neighbours
 from particlesim.impacts.next_impact import body_of, later, pair_meets, wall_meets
 from particlesim.impacts.sieve import sieve
-from particlesim.jit import kernel
+from particlesim.jit import borrowed, kernel
 from particlesim.narrow_phase.contacts import wall_of_partner
 from particlesim.state import Constants, ShapeTable, State, World
 from particlesim.vec import row
@@ -75,6 +75,7 @@ def _wall_met(table, world, constants, state, course, i, wall, duration, points)
 @kernel
 def _look_closer(table, world, constants, state, course, log, pairs, times, duration, first, last):
     """Fill in the times of pairs ``first .. last`` where they are -1."""
+    table, world, constants, state, course, log = borrowed((table, world, constants, state, course, log))
     points = np.empty((MAX_MANIFOLD, 3))
     for k in range(first, last):
         if times[k] < 0.0:
@@ -87,7 +88,7 @@ def _look_closer(table, world, constants, state, course, log, pairs, times, dura
 
 @kernel
 def _across(island, start, other, whom):
-    """Pairs (m, 2) of particles ``whom`` with neighbours of other islands; the smaller first, once if both are listed."""
+    """Pairs (m, 2), the smaller first, of particles ``whom`` with neighbours of other islands."""
     count = 0
     for i in whom:
         count += start[i + 1] - start[i]

@@ -3,9 +3,10 @@
 import math
 
 from particlesim.constants import APPROACH_TOLERANCE, IMPACT_TOLERANCE, SPHERE, WALL
-from particlesim.impacts.time_of_impact import first_touch, sphere_meets_wall, spheres_meet, spheres_near
+from particlesim.impacts.time_of_impact import first_touch, most_closing, sphere_meets_wall, spheres_meet, spheres_near
 from particlesim.jit import kernel
 from particlesim.motion import free_path, spin_of
+from particlesim.narrow_phase.hull_hull import hulls_nearer
 from particlesim.narrow_phase.pair import nearest_image, pair_contact
 from particlesim.narrow_phase.walls import wall_contact, wall_normal
 from particlesim.vec import add, cross, dot, norm, row, scaled, sub
@@ -56,6 +57,12 @@ def _touches(table, world, body_i, path_i, body_j, path_j, wall, points):
 @kernel
 def _hull_meets(table, world, body_i, path_i, body_j, path_j, wall, start, end, points):
     """When two bodies of which one at least is a hull meet in ``start .. end``, on paths given at time 0."""
+    if wall < 0 and table.kind[body_i[0]] != SPHERE and table.kind[body_j[0]] != SPHERE:
+        # Most are too far apart, which the first direction or two of the distance algorithm tell.
+        offset = nearest_image(sub(path_j[0], path_i[0]), world.period)
+        way = most_closing(body_i, path_i, body_j, path_j, end)
+        if not hulls_nearer(table, body_i[0], body_i[1], path_i[1], body_j[0], body_j[1], path_j[1], offset, way):
+            return math.inf
     time = first_touch(
         table, world.lower, world.upper, world.period, body_i, path_i, body_j, path_j, wall, start, end, False, points
     )
@@ -65,20 +72,9 @@ def _hull_meets(table, world, body_i, path_i, body_j, path_j, wall, start, end, 
         touching, approaching = _touches(table, world, body_i, then_i, body_j, then_j, wall, points)
         if touching and not approaching:
             time = first_touch(
-                table,
-                world.lower,
-                world.upper,
-                world.period,
-                body_i,
-                path_i,
-                body_j,
-                path_j,
-                wall,
-                start,
-                end,
-                True,
-                points,
-            )
+                table, world.lower, world.upper, world.period,
+                body_i, path_i, body_j, path_j, wall, start, end, True, points,
+            )  # fmt: skip
     return time
 
 

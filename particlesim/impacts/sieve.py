@@ -1,4 +1,4 @@
-"""The first look at all pairs: spheres that meet are told by the closed form, most of the rest by their bounding spheres.
+"""The first look at all pairs: spheres are told by the closed form, most others by their bounding spheres.
 
 Nearly all the time of a step with few impacts is spent here, so it works on plain arrays and reads no more of a
 particle than it needs.

@@ -1,10 +1,12 @@
-"""When two bodies first meet along their paths: closed forms for spheres, a search that proves its steps for the rest.
+"""When two bodies first meet along their paths: closed forms for spheres, advancement by proven steps for the rest.
 
-The search knows how fast the separation of two bodies can fall at most: along the normal of the nearest points they
-close in no faster than their centroids do, plus what their rotation can add. A separation divided by this speed is a
-time in which they cannot meet (conservative advancement: B. Mirtich, Impulse-based Dynamic Simulation of Rigid Body
-Systems, PhD thesis, Berkeley 1996, section 2.3.2). The same holds backwards from a later moment, and two such times
-that overlap prove all that lies between: so the search may look far ahead and yet passes no impact.
+The search knows two bodies to be apart along the normal of their nearest points. It lets the normal stand, or turn with
+either body or with an edge of each, and knows how fast every corner moves along it. Taking corners to go straight, and
+allowing for the most that rotation can bend their ways, gives a time in which that normal certainly goes on separating
+them; there the next one is taken. No step can pass an impact, however short, and near one the steps converge to it
+quadratically: over short times the corners do go straight, and the normal that turns with the features in contact keeps
+them level. (Conservative advancement, B. Mirtich, Impulse-based Dynamic Simulation of Rigid Body Systems, PhD thesis,
+Berkeley 1996, section 2.3.2, bounds the speed of all corners alike and closes in on an impact by a constant factor.)
 
 A body is (shape, size, radius, principal moments), a path (position, orientation, velocity, angular momentum,
 acceleration) at time 0.
@@ -17,14 +19,13 @@ from particlesim.jit import kernel
 from particlesim.motion import free_rotation, spin_of
 from particlesim.narrow_phase.pair import nearest_image, pair_separation
 from particlesim.narrow_phase.walls import wall_normal, wall_separation
-from particlesim.vec import along, cross, dot, norm, scaled, sub
+from particlesim.vec import add, along, cross, dot, norm, rotate, rotate_back, row, scaled, sub
 
-# Looks at the separation in one search. Few searches take more than twenty.
-_MAX_LOOKS = 400
+# Looks at the separation in one search, which ends where it is then. Few searches take more than ten.
+_MAX_LOOKS = 200
 
-# How far ahead the search looks, in times that are proven: while the separation falls, and while it grows.
-_AHEAD_FALLING = 4.0
-_AHEAD_GROWING = 16.0
+# Refinements of a proven step, which is shorter than it could be where other corners come to the fore.
+_REFINEMENTS = 3
 
 
 @kernel(inline=True)
@@ -83,86 +84,166 @@ def spheres_near(offset, velocity, reach, duration):
 
 
 @kernel
-def _spin_bounds(body, path):
-    """Angular velocity now, its largest length ever, and how fast it can change.
-
-    The angular velocity w of a free body changes as -I^-1 (w x L), and w x L = w x (I - c) w for any number c.
-    """
+def _fastest_corner(body, path):
+    """The largest speed of a point of a body by its rotation [m/s]."""
     a, b, c = body[3]
-    least, most = min(a, b, c), max(a, b, c)
-    spin = spin_of(path[1], path[3], body[3])
-    fastest = norm(path[3]) / least
-    return spin, fastest, fastest * fastest * (most - least) / (2.0 * least)
+    return body[2] * norm(path[3]) / min(a, b, c)
 
 
-@kernel(inline=True)
-def _turning(radius, bounds, normal, duration):
-    """How fast rotation can move a surface along ``normal`` within ``duration`` [m/s]."""
-    spin, fastest, change = bounds
-    return radius * min(fastest, norm(cross(normal, spin)) + change * duration)
+@kernel
+def most_closing(body_i, path_i, body_j, path_j, duration):
+    """How far two surfaces can come nearer within ``duration`` at the most [m]."""
+    speed = norm(sub(path_j[2], path_i[2])) + 0.5 * norm(sub(path_j[4], path_i[4])) * duration
+    return (speed + _fastest_corner(body_i, path_i) + _fastest_corner(body_j, path_j)) * duration
 
 
 @kernel(inline=True)
 def _place(kind, body, path, time):
-    """Position and orientation at ``time``; the orientation of a sphere does not matter."""
+    """Position, orientation and angular velocity at ``time``; those of a sphere's rotation do not matter."""
     position, turn, velocity, momentum, acceleration = path
     position = along(along(position, velocity, time), acceleration, 0.5 * time * time)
+    spin = (0.0, 0.0, 0.0)
     if kind != SPHERE:
         turn = free_rotation(turn, momentum, body[3], time)
-    return position, turn
-
-
-@kernel
-def _separation_at(table, lower, upper, period, body_i, path_i, body_j, path_j, wall, time, points):
-    """Separation and normal of body i and wall ``wall``, or body j if that is -1, at ``time``."""
-    x, q = _place(table.kind[body_i[0]], body_i, path_i, time)
-    if wall >= 0:
-        separation = wall_separation(table, lower, upper, wall, body_i[0], body_i[1], q, x)
-        normal = wall_normal(wall)
-    else:
-        y, p = _place(table.kind[body_j[0]], body_j, path_j, time)
-        offset = nearest_image(sub(y, x), period)
-        separation, normal = pair_separation(table, body_i[0], body_i[1], q, body_j[0], body_j[1], p, offset, points)
-    return separation, normal
-
-
-@kernel
-def _closing(velocity, acceleration, normal, start, end, sign):
-    """The largest speed at which bodies with this relative velocity at time 0 close in (sign -1) or part (+1)."""
-    at_start = dot(velocity, normal) + start * dot(acceleration, normal)
-    at_end = dot(velocity, normal) + end * dot(acceleration, normal)
-    return max(0.0, sign * at_start, sign * at_end)
+        spin = spin_of(turn, momentum, body[3])
+    return position, turn, spin
 
 
 @kernel(inline=True)
-def _first_root(where, depth, tolerance, early, outside, late, inside, points):
-    """The moment in ``early .. late`` when the separation falls to between 0 and the tolerance, by regula falsi.
+def _bend(kind, body, path):
+    """The largest acceleration of a point of a body by its rotation [m/s^2].
 
-    The Illinois variant halves the weight of an end that is kept twice in a row and so converges faster than
-    linearly (M. Dowell, P. Jarratt, BIT 11 (1971) 168).
+    It is w x (w x r) + w' x r, and the angular velocity w of a free body changes as w' = -I^-1 (w x L), where
+    w x L = w x (I - c) w for any number c.
     """
-    if inside >= 0.0:
-        early, outside = late, 0.0
-    gap = outside
-    side = 0
-    for _ in range(_MAX_LOOKS):
-        if gap <= tolerance:
-            break
-        # Aim between nothing and the tolerance, so that the end kept is the one where they are apart.
-        middle = late + (early - late) * (inside - 0.5 * tolerance) / (inside - outside)
-        if not early < middle < late:
-            break
-        separation, _ = _separation_at(*where, middle, points)
-        separation += depth
-        if separation >= 0.0:
-            early, outside, gap = middle, separation, separation
-            inside *= 0.5 if side == 1 else 1.0
-            side = 1
-        else:
-            late, inside = middle, separation
-            outside *= 0.5 if side == -1 else 1.0
-            side = -1
-    return early
+    bend = 0.0
+    if kind != SPHERE:
+        a, b, c = body[3]
+        least, most = min(a, b, c), max(a, b, c)
+        fastest = norm(path[3]) / least
+        bend = body[2] * fastest * fastest * (1.0 + (most - least) / (2.0 * least))
+    return bend
+
+
+@kernel
+def _farthest(vertex, first, last, direction, change, time):
+    """How far vertices ``first .. last`` reach along ``direction + time * change``, and how fast this grows."""
+    towards = along(direction, change, time)
+    farthest, rate = -math.inf, 0.0
+    for v in range(first, last):
+        corner = row(vertex, v)
+        reach = dot(corner, towards)
+        if reach > farthest:
+            farthest, rate = reach, dot(corner, change)
+    return (farthest, rate) if first < last else (0.0, 0.0)
+
+
+@kernel
+def _proven_step(vertex, range_i, way_i, range_j, way_j, gap, parting, bend, most):
+    """For how long [s], ``most`` at the most, a normal certainly goes on separating two bodies.
+
+    ``gap`` [m] lies between them along the normal, their centroids part at ``parting`` [m/s], corners bend away from
+    their straight ways by ``bend`` [m/s^2] at the most. ``way`` is the normal in body axes, outwards, and how it
+    turns there. What is left of the gap is a concave function of time: between a chord's zero, which is too early,
+    and a tangent's, which is too late.
+    """
+    reach_i, rate_i = _farthest(vertex, range_i[0], range_i[1], way_i[0], way_i[1], 0.0)
+    reach_j, rate_j = _farthest(vertex, range_j[0], range_j[1], way_j[0], way_j[1], 0.0)
+    gap += reach_i + reach_j
+    sure, late = 0.0, most
+    left_sure = gap - reach_i - reach_j
+    for _ in range(_REFINEMENTS):
+        slope = parting - bend * sure - rate_i - rate_j
+        if slope < 0.0:
+            late = min(late, sure - left_sure / slope)
+        reach_i, rate_i = _farthest(vertex, range_i[0], range_i[1], way_i[0], way_i[1], late)
+        reach_j, rate_j = _farthest(vertex, range_j[0], range_j[1], way_j[0], way_j[1], late)
+        left_late = gap + (parting - 0.5 * bend * late) * late - reach_i - reach_j
+        if left_late >= 0.0:
+            return late
+        sure += (late - sure) * left_sure / (left_sure - left_late)
+        reach_i, rate_i = _farthest(vertex, range_i[0], range_i[1], way_i[0], way_i[1], sure)
+        reach_j, rate_j = _farthest(vertex, range_j[0], range_j[1], way_j[0], way_j[1], sure)
+        left_sure = max(0.0, gap + (parting - 0.5 * bend * sure) * sure - reach_i - reach_j)
+    return sure
+
+
+@kernel
+def _facing_edge(vertex, first, last, direction):
+    """From the vertex that reaches farthest along ``direction`` to the one that comes next."""
+    best = second = first
+    reach = nearly = -math.inf
+    for v in range(first, last):
+        r = dot(row(vertex, v), direction)
+        if r > reach:
+            best, second, reach, nearly = v, best, r, reach
+        elif r > nearly:
+            second, nearly = v, r
+    return sub(row(vertex, second), row(vertex, best)) if first < last else (0.0, 0.0, 0.0)
+
+
+@kernel
+def _turning_with_edges(edge_i, with_i, edge_j, with_j, normal):
+    """How a normal turns that stays across an edge of each of two bodies; (0, 0, 0) if the edges are parallel.
+
+    ``with_i`` and ``with_j`` are how it turns with either body.
+    """
+    across_i, across_j = cross(normal, edge_i), cross(edge_j, normal)
+    area = dot(edge_i, across_j)
+    turning = (0.0, 0.0, 0.0)
+    if area != 0.0:
+        turning = along(scaled(across_j, dot(with_i, edge_i) / area), across_i, dot(with_j, edge_j) / area)
+    return turning
+
+
+@kernel
+def _step_of_turning(
+    vertex, range_i, body_i, range_j, body_j, normal, turning, gap, offset, velocity, speed, bend, most
+):
+    """The proven step (see _proven_step) of a normal that turns at ``turning`` [1/s].
+
+    A body is (size, orientation, angular velocity) here; ``offset`` and ``velocity`` are of the second from the
+    first, ``speed`` bounds that of any two of their points. A corner at r moves along the normal n at n . (w x r),
+    which is r . (n x w), and gains r . n' by the normal's own turning.
+    """
+    size_i, turn_i, spin_i = body_i
+    size_j, turn_j, spin_j = body_j
+    back, turning_back = scaled(normal, -1.0), scaled(turning, -1.0)
+    way_i = (
+        scaled(rotate_back(turn_i, normal), size_i),
+        scaled(rotate_back(turn_i, add(turning, cross(normal, spin_i))), size_i),
+    )
+    way_j = (
+        scaled(rotate_back(turn_j, back), size_j),
+        scaled(rotate_back(turn_j, add(turning_back, cross(back, spin_j))), size_j),
+    )
+    rate = norm(turning)
+    # Along a turning normal n, corners a vector s apart bend by n'' . s + 2 n' . s' + n . s''.
+    bend += rate * (rate * speed[1] + 2.0 * speed[0])
+    parting = dot(velocity, normal) + dot(offset, turning)
+    return _proven_step(vertex, range_i, way_i, range_j, way_j, gap, parting, bend, most)
+
+
+@kernel(inline=True)
+def _longest_proven_step(
+    vertex, range_i, body_i, range_j, body_j, normal, stands, gap, offset, velocity, speed, bend, most
+):
+    """The longest of the proven steps of a normal that stands, turns with either body, or with an edge of each.
+
+    Where it ``stands``, as that of a wall, it must not turn.
+    """
+    with_i, with_j = cross(body_i[2], normal), cross(body_j[2], normal)
+    edge_i = _facing_edge(vertex, range_i[0], range_i[1], rotate_back(body_i[1], normal))
+    edge_j = _facing_edge(vertex, range_j[0], range_j[1], rotate_back(body_j[1], scaled(normal, -1.0)))
+    with_both = _turning_with_edges(rotate(body_i[1], edge_i), with_i, rotate(body_j[1], edge_j), with_j, normal)
+    longest = 0.0
+    for turning in ((0.0, 0.0, 0.0), with_i, with_j, with_both):
+        if longest < most and not (stands and norm(turning) > 0.0):
+            step = _step_of_turning(
+                vertex, range_i, body_i, range_j, body_j, normal, turning, gap, offset, velocity, speed, bend, most
+            )
+            longest = max(longest, step)
+    return longest
 
 
 @kernel
@@ -171,47 +252,56 @@ def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wal
 
     The partner is wall ``wall``, or body j if that is -1. With ``parted`` they touch at the start and part: then it
     is when they have sunk into each other by SINKING of their sizes, which ends the search among touches that are
-    only rounding. The moment returned is one at which they are still apart, by IMPACT_TOLERANCE of their sizes at most.
+    only rounding. At the moment returned they are apart, by IMPACT_TOLERANCE of their sizes at the most.
     """
-    where = table, lower, upper, period, body_i, path_i, body_j, path_j, wall
-    sizes = body_i[1] + (body_j[1] if wall < 0 else 0.0)
-    tolerance = IMPACT_TOLERANCE * sizes
-    velocity, acceleration = scaled(path_i[2], -1.0), scaled(path_i[4], -1.0)
-    spin_i = _spin_bounds(body_i, path_i)
-    spin_j, radius_j = spin_i, 0.0
-    if wall < 0:
-        velocity, acceleration = sub(path_j[2], path_i[2]), sub(path_j[4], path_i[4])
-        spin_j, radius_j = _spin_bounds(body_j, path_j), body_j[2]
-    low = start
-    gap, normal = _separation_at(*where, low, points)
-    # Everything below looks at the separation plus this.
-    depth = (max(0.0, -gap) + SINKING * sizes) if parted else 0.0
-    gap += depth
-    if gap <= tolerance:
-        return low
-    ahead = _AHEAD_FALLING
-    guess = math.inf
+    vertex, vertex_start = table.vertex, table.vertex_start
+    kind_i, kind_j = table.kind[body_i[0]], table.kind[body_j[0]]
+    range_i = vertex_start[body_i[0]], vertex_start[body_i[0] + 1]
+    range_j = vertex_start[body_j[0]], vertex_start[body_j[0] + 1]
+    sizes, radii = body_i[1] + body_j[1], body_i[2] + body_j[2]
+    velocity, acceleration = sub(path_j[2], path_i[2]), sub(path_j[4], path_i[4])
+    bend = _bend(kind_i, body_i, path_i) + _bend(kind_j, body_j, path_j)
+    turning = _fastest_corner(body_i, path_i) + _fastest_corner(body_j, path_j)
+    if wall >= 0:
+        range_j, sizes, radii = (0, 0), body_i[1], body_i[2]
+        velocity, acceleration = scaled(path_i[2], -1.0), scaled(path_i[4], -1.0)
+        bend, turning = _bend(kind_i, body_i, path_i), _fastest_corner(body_i, path_i)
+    bend += norm(acceleration)
+    way = norm(velocity) + norm(acceleration) * end
+    time = start
+    sunk = math.inf
     for _ in range(_MAX_LOOKS):
-        turning = _turning(body_i[2], spin_i, normal, end) + _turning(radius_j, spin_j, normal, end)
-        speed = _closing(velocity, acceleration, normal, low, end, -1.0) + turning
-        if gap >= speed * (end - low):
-            return math.inf
-        sure = gap / speed
-        high = min(low + min(max(guess, sure), ahead * sure), end)
-        beyond, normal_beyond = _separation_at(*where, high, points)
-        beyond += depth
-        if beyond <= tolerance:
-            return _first_root(where, depth, tolerance, low, gap, high, beyond, points)
-        turning = _turning(body_i[2], spin_i, normal_beyond, end) + _turning(radius_j, spin_j, normal_beyond, end)
-        back = _closing(velocity, acceleration, normal_beyond, low, high, 1.0) + turning
-        unproven = (high - low - sure) * back - beyond
-        # What could hide between the two proven stretches is no deeper than half of what is left to close and part.
-        if unproven <= SINKING * sizes:
-            falling = (gap - beyond) / (high - low)
-            guess = beyond / falling if falling > 0.0 else math.inf
-            ahead = _AHEAD_FALLING if falling > 0.0 else _AHEAD_GROWING
-            low, gap, normal = high, beyond, normal_beyond
+        x, q, w = _place(kind_i, body_i, path_i, time)
+        p, u = q, (0.0, 0.0, 0.0)
+        if wall >= 0:
+            gap = wall_separation(table, lower, upper, wall, body_i[0], body_i[1], q, x)
+            normal = wall_normal(wall)
+            offset = (0.0, 0.0, 0.0)
         else:
-            guess = 0.5 * (high - low)
-            ahead = _AHEAD_FALLING
-    return low
+            y, p, u = _place(kind_j, body_j, path_j, time)
+            offset = nearest_image(sub(y, x), period)
+            gap, normal = pair_separation(table, body_i[0], body_i[1], q, body_j[0], body_j[1], p, offset, points)
+        if sunk == math.inf:
+            sunk = max(0.0, -gap) + SINKING * sizes if parted else 0.0
+        gap += sunk
+        if gap <= IMPACT_TOLERANCE * sizes:
+            return time
+        step = _longest_proven_step(
+            vertex,
+            range_i,
+            (body_i[1], q, w),
+            range_j,
+            (body_j[1], p, u),
+            normal,
+            wall >= 0,
+            gap,
+            offset,
+            along(velocity, acceleration, time),
+            (way + turning, norm(offset) + radii + way * (end - time)),
+            bend,
+            end - time,
+        )
+        if step >= end - time:
+            return math.inf
+        time += step
+    return time
