@@ -11,7 +11,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from particlesim.broad_phase import find_pairs
-from particlesim.constants import MAX_MANIFOLD, OPEN, PERIODIC, WALL, WALL_NAMES
+from particlesim.constants import (
+    APPROACH_TOLERANCE,
+    MAX_MANIFOLD,
+    OPEN,
+    PERIODIC,
+    RESTING_SINKING,
+    SINKING,
+    WALL,
+    WALL_NAMES,
+)
 from particlesim.launch import initial_state, random_quaternions
 from particlesim.narrow_phase.contacts import contact_now, touching_pairs, touching_walls, wall_of_partner
 from particlesim.placement import positions
@@ -67,13 +76,18 @@ def build_world(scene: Scene) -> World:
     """The world of a scene as arrays."""
     half = 0.5 * np.array(scene.world.size)
     boundary = np.array([_BOUNDARIES[name] for name in scene.world.boundary])
+    gravity = np.array(scene.world.gravity, dtype=np.float64)
+    loses = min([scene.world.restitution, *(g.restitution for g in scene.particles if g.restitution is not None)]) < 1.0
     return World(
         lower=-half,
         upper=half,
         boundary=boundary,
         period=np.where(boundary == PERIODIC, 2.0 * half, 0.0),
-        gravity=np.array(scene.world.gravity, dtype=np.float64),
+        gravity=gravity,
         restitution=float(scene.world.restitution),
+        # The same fraction of the speed of a fall through the world.
+        still=APPROACH_TOLERANCE * float(np.sqrt(2.0 * np.abs(gravity) @ scene.world.size)),
+        sinking=RESTING_SINKING if gravity.any() and loses else SINKING,
     )
 
 

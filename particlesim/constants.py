@@ -12,12 +12,12 @@ OPEN = 2
 # The six walls in the order of the ledger's wall impulses.
 WALL_NAMES = ("-x", "+x", "-y", "+y", "-z", "+z")
 
-# In an automatic time step the surfaces of particles move by this fraction of their inscribed radii on average. It
+# In an automatic time step the surfaces of particles move by this fraction of their bounding radii on average. It
 # decides how often neighbours are looked up and how much hangs together, not what happens: impacts have own times.
-STEP_FRACTION = 0.15
+STEP_FRACTION = 0.1
 
 # A time step in which they would move farther than this is taken in several stretches.
-LONGEST_STRETCH = 0.3
+LONGEST_STRETCH = 0.25
 
 # Two faces, or an edge and a face, closer to parallel than this touch along a patch, not at a point [sine of the
 # angle].  Rounding turns a face by about 1e-15; a fall of one radius at this angle shifts the contact by 1e-6 of it.
@@ -26,10 +26,17 @@ PARALLEL_TOLERANCE = 1e-6
 # The most points a contact patch keeps, as two squares across each other have. The impulse acts in their middle first.
 MAX_MANIFOLD = 8
 
-# Under gravity a particle that meets something more slowly than a fall from this fraction of its inscribed radius
-# rebounds in full, whatever its restitution: its bounces would become infinitely many in finite time.  What is left
-# is a tremble of a thousandth of its size that neither gains nor loses energy; it does not sink.
+# Under gravity, what meets more slowly than by a fall from this fraction of its inscribed radius comes to rest: its
+# bounces, if not ended, would be infinitely many in finite time, and are lower than can be seen.  It rebounds in full
+# to the end of the stretch of time, and rests from then on (see impacts/resting.py).
 RESTING_DROP = 1e-3
+
+# Faces and edges inclined by less than this [sine of the angle] rest on each other along a patch: about what a face
+# is inclined by when one of its edges lies and the other is a few RESTING_DROP away.
+RESTING_TILT = 1e-2
+
+# What rebounds in full rests only if it is this much slower and nearer than what does not: energy is kept to 1e-14.
+STILL = 1e-6
 
 # Impacts that hang together within one stretch of time, for each of their particles, before what still approaches is
 # left to the next one and counted.
@@ -52,10 +59,12 @@ APPROACH_TOLERANCE = 1e-12
 # rounding of positions in a world a thousand sizes wide, so that the particles are apart when they go on.
 IMPACT_TOLERANCE = 1e-12
 
-# Bodies that touch and part may sink into each other by this fraction of their sizes before they count as meeting
-# again: it bounds the number of impacts between two that roll over each other, and is a tenth of what a hull may
-# overlap at a frame.
-SINKING = 1e-7
+# Bodies that touch and part, or hardly move, may sink into each other by this fraction of their sizes before they
+# count as meeting again: it bounds the number of impacts between two that roll over each other or lie still.
+SINKING = 4e-7
+
+# The same where gravity brings things to rest: few impacts pass between a jolt and the next rest.
+RESTING_SINKING = 1e-5
 
 # A particle may get this fraction of its radius away from where it was when its neighbours were looked up, and half
 # as far again as it flies in one stretch of time, before they are looked up anew.

@@ -77,7 +77,8 @@ def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
         array.parent = cgutils.get_null_value(array.parent.type)
         return array._getvalue()  # the way numba's own code reads it
     if isinstance(kind, types.BaseTuple):
-        for k, element in enumerate(kind.types):
+        elements: Any = kind
+        for k, element in enumerate(elements):
             changed = _without_owner(context, builder, element, builder.extract_value(value, k))
             value = builder.insert_value(value, changed, k)
     return value

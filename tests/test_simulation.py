@@ -64,14 +64,14 @@ def test_a_run_ends_where_it_is_told():
         sim.run()
 
 
-def test_surfaces_move_by_a_fraction_of_the_inscribed_radii_in_an_automatic_step():
+def test_surfaces_move_by_a_fraction_of_the_radii_in_an_automatic_step():
     sim = Simulation(gas(gravity=(0, 0, -9.81)))
     for _ in range(10):
         particles = sim.particles
         surface = np.linalg.norm(particles.velocity, axis=1)
         surface = surface + np.linalg.norm(particles.angular_velocity, axis=1) * particles.radius
         step = sim.next_time_step()
-        moved = (surface * step + 0.5 * 9.81 * step**2) / particles.inradius
+        moved = (surface * step + 0.5 * 9.81 * step**2) / particles.radius
         assert moved.mean() == pytest.approx(STEP_FRACTION, rel=1e-9)
         sim.step()
 

@@ -18,8 +18,8 @@ from particlesim.vec import put, put4, row, row4
 NOTHING_MET = -1
 UNCHAINED = -2
 
-# Columns of a piece: when it starts, then position, orientation, velocity and angular momentum.
-PIECE = 14
+# Columns of a piece: when it starts, then position, orientation, velocity, angular momentum and acceleration.
+PIECE = 17
 
 
 class Course(NamedTuple):
@@ -59,32 +59,40 @@ def empty_log() -> Log:
 
 
 @kernel
-def write_piece(piece, index, time, state, i):
+def write_piece(piece, index, time, state, acceleration, i):
     """Write the state of particle ``i`` as a piece that starts at ``time``."""
     piece[index, 0] = time
     for axis in range(3):
         piece[index, 1 + axis] = state.position[i, axis]
         piece[index, 8 + axis] = state.velocity[i, axis]
         piece[index, 11 + axis] = state.angular_momentum[i, axis]
+        piece[index, 14 + axis] = acceleration[i, axis]
     for axis in range(4):
         piece[index, 4 + axis] = state.orientation[i, axis]
 
 
 @kernel
 def path_of_piece(piece, index):
-    """Position, orientation, velocity and angular momentum at the start of a piece."""
+    """Position, orientation, velocity, angular momentum and acceleration at the start of a piece."""
     return (
         (piece[index, 1], piece[index, 2], piece[index, 3]),
         (piece[index, 4], piece[index, 5], piece[index, 6], piece[index, 7]),
         (piece[index, 8], piece[index, 9], piece[index, 10]),
         (piece[index, 11], piece[index, 12], piece[index, 13]),
+        (piece[index, 14], piece[index, 15], piece[index, 16]),
     )
 
 
 @kernel
-def path_of_state(state, i):
-    """Position, orientation, velocity and angular momentum of particle ``i``."""
-    return row(state.position, i), row4(state.orientation, i), row(state.velocity, i), row(state.angular_momentum, i)
+def path_of_state(state, acceleration, i):
+    """Position, orientation, velocity, angular momentum and acceleration of particle ``i``."""
+    return (
+        row(state.position, i),
+        row4(state.orientation, i),
+        row(state.velocity, i),
+        row(state.angular_momentum, i),
+        row(acceleration, i),
+    )
 
 
 @kernel
@@ -119,11 +127,12 @@ def rewind(course, log, state, particles):
         course.clock[i] = 0.0
         course.stamp[i] = 0
         if course.head[i] >= 0:
-            position, turn, velocity, momentum = path_of_piece(log.piece, course.head[i])
+            position, turn, velocity, momentum, pull = path_of_piece(log.piece, course.head[i])
             put(state.position, i, position)
             put4(state.orientation, i, turn)
             put(state.velocity, i, velocity)
             put(state.angular_momentum, i, momentum)
+            put(course.acceleration, i, pull)
             course.head[i] = NOTHING_MET
 
 

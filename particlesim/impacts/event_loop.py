@@ -9,13 +9,12 @@ import numpy as np
 
 from particlesim.constants import MAX_IMPACTS, MAX_MANIFOLD, SIMULTANEOUS
 from particlesim.impacts.course import NOTHING_MET, PIECE, UNCHAINED, path_of_state, write_piece
-from particlesim.impacts.next_impact import body_of, pair_meets, wall_meets
+from particlesim.impacts.next_impact import body_of, later, pair_meets, wall_meets
 from particlesim.impacts.response import answer
 from particlesim.impacts.sieve import grown
 from particlesim.jit import borrowed, kernel
-from particlesim.motion import free_path
 from particlesim.narrow_phase.contacts import wall_as_partner
-from particlesim.vec import put, put4, row
+from particlesim.vec import put, put4, row, vector
 
 
 @kernel
@@ -44,19 +43,14 @@ def _foretell(table, world, constants, state, course, start, other, whom, done, 
     i = whom[done]
     kind, lower, upper, boundary = table.kind, world.lower, world.upper, world.boundary
     now = clock[i]
-    position, turn, velocity, momentum = path_of_state(state, i)
-    path = position, turn, velocity, momentum, row(course.acceleration, i)
+    path = path_of_state(state, course.acceleration, i)
     body = body_of(constants, i)
     for near in range(start[i], start[i + 1]):
         j = other[near]
         if island[j] != island[i] or _among(whom, done, j):
             continue
         moments = row(constants.inertia, j)
-        there, turned, going, turning = path_of_state(state, j)
-        pull = row(course.acceleration, j)
-        if clock[j] != now:
-            there, turned, going = free_path(there, turned, going, turning, moments, pull, now - clock[j])
-        path_j = there, turned, going, turning, pull
+        path_j = later(path_of_state(state, course.acceleration, j), moments, now - clock[j])
         body_j = body_of(constants, j)
         one, on, two, upon = body, path, body_j, path_j
         if j < i:
@@ -127,9 +121,8 @@ def _bring(state, course, constants, i, time):
     since = time - course.clock[i]
     course.clock[i] = time
     if since != 0.0:
-        position, turn, velocity, momentum = path_of_state(state, i)
-        pull, moments = row(course.acceleration, i), row(constants.inertia, i)
-        position, turn, velocity = free_path(position, turn, velocity, momentum, moments, pull, since)
+        path = path_of_state(state, course.acceleration, i)
+        position, turn, velocity, _, _ = later(path, row(constants.inertia, i), since)
         put(state.position, i, position)
         put4(state.orientation, i, turn)
         put(state.velocity, i, velocity)
@@ -194,7 +187,7 @@ def run_islands(
             for m in range(size):
                 i = whom[m]
                 if head[i] == NOTHING_MET:
-                    write_piece(piece, pieces, 0.0, state, i)
+                    write_piece(piece, pieces, 0.0, state, course.acceleration, i)
                     particle[pieces, 0] = i
                     pieces += 1
                     head[i] = UNCHAINED
@@ -203,7 +196,10 @@ def run_islands(
             for m in range(size):
                 i = whom[m]
                 stamp[i] += 1
-                write_piece(piece, pieces, time, state, i)
+                if answered:
+                    # Whatever held it up before the stretch need not do so any more.
+                    put(course.acceleration, i, vector(world.gravity))
+                write_piece(piece, pieces, time, state, course.acceleration, i)
                 particle[pieces, 0] = i
                 pieces += 1
             # What touches and was found not to approach must not be foretold for this moment again.

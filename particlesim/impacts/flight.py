@@ -26,6 +26,7 @@ from particlesim.impacts.islands import Islands, unite
 from particlesim.impacts.meetings import Where, first_meetings, missed_meetings
 from particlesim.impacts.neighbours import FindPairs, find_neighbours, leashes
 from particlesim.impacts.response import IMPACTS, TALLY, VIRIAL, WALLS
+from particlesim.impacts.resting import Resting
 from particlesim.state import Constants, ShapeTable, State, World
 
 # Particles whose paces are summed at a time: sums depend on the order, and must not on the number of threads.
@@ -61,6 +62,7 @@ class Flight:
         self._leash = np.empty(count)
         self._first_met = np.full(count, -1, dtype=np.int64)
         self._tally = np.zeros((count, TALLY))
+        self._resting = Resting(table, world, constants, state)
         self.counts = Counts()
         self.seconds = dict.fromkeys(PHASES, 0.0)
         self._on_leash = -1.0
@@ -72,7 +74,7 @@ class Flight:
         return self._neighbours.pairs
 
     def longest_stretch(self, fraction: float) -> float:
-        """In how long [s] the surfaces move by ``fraction`` of the inscribed radius on average; inf if never.
+        """In how long [s] the surfaces move by ``fraction`` of the bounding radius on average; inf if never.
 
         The surface of a particle moves at most (|v| + |w| R) t + g t^2 / 2. On periodic axes nothing goes farther
         than an eighth of the way round, so that it is clear which image of another it meets.
@@ -84,6 +86,7 @@ class Flight:
         fastest = paces(self._constants, self._state, self._world, sums, _ROWS)
         pace, pull = sums.sum(axis=0) / count
         time = _time_for(fraction, pace, pull)
+        time = min(time, self._resting.longest_stretch)
         around = self._world.period[self._world.period > 0.0]
         if len(around):
             gravity = float(np.linalg.norm(self._world.gravity))
@@ -115,6 +118,8 @@ class Flight:
         """Move all on by ``duration`` [s]; False, with nothing moved, if that takes too many rounds."""
         course, state = self._course, self._state
         log = empty_log()
+        with self._spent_on("respond"):
+            self._resting.hold(self._neighbours, course.acceleration, duration)
         with self._spent_on("contacts"):
             met, times = first_meetings(self._where(log), self._neighbours, duration)
         touched = np.unique(met[met >= 0])
@@ -141,6 +146,7 @@ class Flight:
                 self._fly_on(duration)
         else:
             rewind(course, log, state, touched)
+            self._resting.release()
         self._first_met[met[starts, 0]] = -1
         self._tally[touched] = 0.0
         forget(course, touched)

@@ -27,6 +27,7 @@ def fly_on(constants, state, world, clock, acceleration, anchor, leash, duration
     position, orientation, velocity = state.position, state.orientation, state.velocity
     momentum, image, inertia = state.angular_momentum, state.image, constants.inertia
     corner, period = world.lower, world.period
+    gravity = norm(vector(world.gravity))
     longest = math.inf
     for i in range(first, last):
         pull = row(acceleration, i)
@@ -55,7 +56,7 @@ def fly_on(constants, state, world, clock, acceleration, anchor, leash, duration
         else:
             # room = speed t + pull t^2 / 2
             speed = norm(v)
-            denominator = speed + math.sqrt(speed * speed + 2.0 * norm(pull) * room)
+            denominator = speed + math.sqrt(speed * speed + 2.0 * max(gravity, norm(pull)) * room)
             if denominator > 0.0:
                 longest = min(longest, 2.0 * room / denominator)
     return longest
@@ -90,12 +91,12 @@ def all_on_leash(log_piece, particle, state, clock, acceleration, anchor, leash,
 
 @kernel
 def paces(constants, state, world, out, rows):
-    """Sums over blocks of ``rows`` particles: how fast surfaces move, and gravity pulls, in inscribed radii.
+    """Sums over blocks of ``rows`` particles: how fast surfaces move, and gravity pulls, in bounding radii.
 
     ``out`` (blocks, 2) [1/s], [1/s^2]. Returns the largest speed [m/s].
     """
     velocity, orientation, momentum = state.velocity, state.orientation, state.angular_momentum
-    inertia, radius, inradius = constants.inertia, constants.radius, constants.inradius
+    inertia, radius = constants.inertia, constants.radius
     g = norm(vector(world.gravity))
     fastest = 0.0
     for block in range(len(out)):
@@ -107,7 +108,7 @@ def paces(constants, state, world, out, rows):
             speed = math.sqrt(speed2)
             if dot(own, own) > 0.0:
                 speed += norm(spin_of(row4(orientation, i), own, row(inertia, i))) * radius[i]
-            pace += speed / inradius[i]
-            pull += g / inradius[i]
+            pace += speed / radius[i]
+            pull += g / radius[i]
         out[block, 0], out[block, 1] = pace, pull
     return math.sqrt(fastest)

@@ -31,12 +31,11 @@ def _piece_ends(log, piece, duration):
 def _path_at(log, state, course, constants, i, piece, time):
     """The path of particle ``i`` as seen at a time within a piece of it."""
     if piece >= 0:
-        position, turn, velocity, momentum = path_of_piece(log.piece, piece)
+        path = path_of_piece(log.piece, piece)
         begun = log.piece[piece, 0]
     else:
-        position, turn, velocity, momentum = path_of_state(state, i)
+        path = path_of_state(state, course.acceleration, i)
         begun = 0.0
-    path = position, turn, velocity, momentum, row(course.acceleration, i)
     return later(path, row(constants.inertia, i), time - begun)
 
 
@@ -64,8 +63,7 @@ def _first_meeting(table, world, constants, state, course, log, i, j, duration, 
 @kernel(inline=True)
 def _wall_met(table, world, constants, state, course, i, wall, duration, points):
     """When particle ``i`` first meets a wall on the path it is on at the start; inf if it does not."""
-    position, turn, velocity, momentum = path_of_state(state, i)
-    path = position, turn, velocity, momentum, row(course.acceleration, i)
+    path = path_of_state(state, course.acceleration, i)
     body = body_of(constants, i)
     return wall_meets(
         table, world, world.lower, world.upper, world.boundary, table.kind[body[0]], body, path, wall, duration, points

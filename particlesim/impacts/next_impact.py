@@ -28,9 +28,22 @@ def velocity_at(path, moments, arm):
     return add(path[2], cross(spin_of(path[1], path[3], moments), arm))
 
 
+@kernel
+def _speed_at_depth(depth, acceleration):
+    """Half the speed that an acceleration gives to bodies until they have sunk into each other by ``depth`` [m/s].
+
+    What parts more slowly would meet again within a moment, over and over.
+    """
+    return 0.5 * math.sqrt(2.0 * acceleration * depth)
+
+
 @kernel(inline=True)
 def _touches(table, world, body_i, path_i, body_j, path_j, wall, points):
-    """Whether two bodies touch, and whether any point of their contact approaches."""
+    """Whether two bodies touch; whether any point of their contact approaches; how deep they may go if none does [m].
+
+    If they part everywhere, that is as deep as they are. If not, or if they part so slowly that they would be back at
+    once, it is ``world.sinking`` of their sizes, or a little deeper than they are up to twice that.
+    """
     if wall >= 0:
         separation, count = wall_contact(table, world, wall, body_i[0], body_i[1], path_i[1], path_i[0], points)
         normal, offset = wall_normal(wall), (0.0, 0.0, 0.0)
@@ -41,8 +54,12 @@ def _touches(table, world, body_i, path_i, body_j, path_j, wall, points):
             table, body_i[0], body_i[1], path_i[1], body_j[0], body_j[1], path_j[1], offset, points
         )
         sizes = body_i[1] + body_j[1]
-    touching = separation <= IMPACT_TOLERANCE * sizes
-    approaching = False
+    tolerance = IMPACT_TOLERANCE * sizes
+    touching = separation <= tolerance
+    pull = path_i[4] if wall >= 0 else sub(path_j[4], path_i[4])
+    sinking = world.sinking * sizes
+    at_once = _speed_at_depth(sinking, norm(pull))
+    approaching, leaving = False, True
     for k in range(count if touching else 0):
         of_i = velocity_at(path_i, body_i[3], row(points, k))
         parting, speed = -dot(of_i, normal), norm(of_i)
@@ -50,8 +67,13 @@ def _touches(table, world, body_i, path_i, body_j, path_j, wall, points):
             of_j = velocity_at(path_j, body_j[3], sub(row(points, k), offset))
             parting += dot(of_j, normal)
             speed += norm(of_j)
-        approaching = approaching or parting < -APPROACH_TOLERANCE * speed
-    return touching, approaching
+        none = APPROACH_TOLERANCE * speed + world.still
+        approaching = approaching or parting < -none
+        leaving = leaving and parting > none + at_once
+    depth = max(0.0, -separation) + 4.0 * tolerance
+    if not leaving:
+        depth = max(sinking, depth, min(depth + 0.25 * sinking, 2.0 * sinking))
+    return touching, approaching, depth
 
 
 @kernel
@@ -63,18 +85,14 @@ def _hull_meets(table, world, body_i, path_i, body_j, path_j, wall, start, end, 
         way = most_closing(body_i, path_i, body_j, path_j, end)
         if not hulls_nearer(table, body_i[0], body_i[1], path_i[1], body_j[0], body_j[1], path_j[1], offset, way):
             return math.inf
-    time = first_touch(
-        table, world.lower, world.upper, world.period, body_i, path_i, body_j, path_j, wall, start, end, False, points
-    )
+    where = table, world.lower, world.upper, world.period, body_i, path_i, body_j, path_j, wall, start, end
+    time = first_touch(*where, 0.0, points)
     if time == start:
         then_i = later(path_i, body_i[3], start)
         then_j = later(path_j, body_j[3], start)
-        touching, approaching = _touches(table, world, body_i, then_i, body_j, then_j, wall, points)
+        touching, approaching, depth = _touches(table, world, body_i, then_i, body_j, then_j, wall, points)
         if touching and not approaching:
-            time = first_touch(
-                table, world.lower, world.upper, world.period,
-                body_i, path_i, body_j, path_j, wall, start, end, True, points,
-            )  # fmt: skip
+            time = first_touch(*where, depth, points)
     return time
 
 
@@ -85,7 +103,7 @@ def body_of(constants, i):
 
 
 @kernel(inline=True)
-def _spheres_meet(body_i, path_i, body_j, path_j, offset, duration):
+def _spheres_meet(body_i, path_i, body_j, path_j, offset, still, duration):
     """When two spheres under the same acceleration meet, at once only if they approach by more than rounding."""
     velocity = sub(path_j[2], path_i[2])
     reach = body_i[2] + body_j[2]
@@ -93,7 +111,8 @@ def _spheres_meet(body_i, path_i, body_j, path_j, offset, duration):
     if time == 0.0:
         of_i = velocity_at(path_i, body_i[3], scaled(offset, body_i[2] / reach))
         of_j = velocity_at(path_j, body_j[3], scaled(offset, -body_j[2] / reach))
-        if dot(offset, velocity) >= -APPROACH_TOLERANCE * (norm(of_i) + norm(of_j)) * norm(offset):
+        tolerance = APPROACH_TOLERANCE * (norm(of_i) + norm(of_j)) + still
+        if dot(offset, velocity) >= -tolerance * norm(offset):
             time = math.inf
     return time
 
@@ -104,7 +123,7 @@ def pair_meets(table, world, kind_i, body_i, path_i, kind_j, body_j, path_j, dur
     offset = nearest_image(sub(path_j[0], path_i[0]), world.period)
     acceleration = sub(path_j[4], path_i[4])
     if kind_i == SPHERE and kind_j == SPHERE and dot(acceleration, acceleration) == 0.0:
-        time = _spheres_meet(body_i, path_i, body_j, path_j, offset, duration)
+        time = _spheres_meet(body_i, path_i, body_j, path_j, offset, world.still, duration)
     else:
         # Bounding spheres first: larger by what the acceleration could do.
         reach = body_i[2] + body_j[2] + 0.5 * norm(acceleration) * duration * duration
@@ -115,6 +134,17 @@ def pair_meets(table, world, kind_i, body_i, path_i, kind_j, body_j, path_j, dur
 
 
 @kernel(inline=True)
+def _sphere_meets_wall(body, path, normal, room, speed, acceleration, still, sinking, duration):
+    """When a sphere meets a wall; if it touches it and hardly moves, when it has sunk into it a little."""
+    if room <= IMPACT_TOLERANCE * body[1]:
+        surface = velocity_at(path, body[3], scaled(normal, body[2]))
+        none = APPROACH_TOLERANCE * norm(surface) + still
+        if -none - _speed_at_depth(sinking, max(acceleration, 0.0)) <= speed <= none:
+            room = max(0.25 * sinking, sinking + room)
+    return sphere_meets_wall(room, speed, acceleration, duration)
+
+
+@kernel(inline=True)
 def wall_meets(table, world, lower, upper, boundary, kind, body, path, wall, duration, points):
     """When a particle meets a wall within ``duration`` on a path given at time 0; inf if it does not."""
     time = math.inf
@@ -122,14 +152,14 @@ def wall_meets(table, world, lower, upper, boundary, kind, body, path, wall, dur
     if boundary[axis] == WALL:
         normal = wall_normal(wall)
         room = (upper[axis] - path[0][axis] if wall % 2 else path[0][axis] - lower[axis]) - body[2]
-        speed = dot(path[2], normal)
-        time = sphere_meets_wall(room, speed, dot(path[4], normal), duration)
-        if kind != SPHERE:
+        speed, acceleration = dot(path[2], normal), dot(path[4], normal)
+        if kind == SPHERE:
+            time = _sphere_meets_wall(
+                body, path, normal, room, speed, acceleration, world.still, world.sinking * body[1], duration
+            )
+        else:
+            time = sphere_meets_wall(room, speed, acceleration, duration)
             if time < math.inf or room <= 0.0:
                 start = time if room > 0.0 else 0.0
                 time = _hull_meets(table, world, body, path, body, path, wall, start, duration, points)
-        elif time == 0.0:
-            surface = velocity_at(path, body[3], scaled(normal, body[2]))
-            if speed <= APPROACH_TOLERANCE * norm(surface):
-                time = math.inf
     return time

@@ -43,7 +43,7 @@ def _inverse_mass_at(constants, state, i, arm, normal):
 
 
 @kernel
-def _approach(constants, state, i, j, point, offset, normal):
+def _approach(still, constants, state, i, j, point, offset, normal):
     """Speed at which the partners part at a point (negative: they approach), and the speed that counts as none."""
     of_i = _point_velocity(constants, state, i, point)
     parting = -dot(of_i, normal)
@@ -52,7 +52,7 @@ def _approach(constants, state, i, j, point, offset, normal):
         of_j = _point_velocity(constants, state, j, sub(point, offset))
         parting += dot(of_j, normal)
         speed += norm(of_j)
-    return parting, APPROACH_TOLERANCE * speed
+    return parting, APPROACH_TOLERANCE * speed + still
 
 
 @kernel
@@ -63,7 +63,7 @@ def _resting_speed(world, constants, i):
 
 
 @kernel
-def _restitution(world, constants, i, j):
+def restitution_of(world, constants, i, j):
     """Of a pair: the smaller one; and the speed below which it does not count."""
     if j < 0:
         return min(constants.restitution[i], world.restitution), _resting_speed(world, constants, i)
@@ -83,18 +83,18 @@ def _middle(points, count):
 
 
 @kernel
-def _point_to_answer(constants, state, i, j, points, count, offset, normal):
+def _point_to_answer(still, constants, state, i, j, points, count, offset, normal):
     """Where a contact is answered next, and how fast it parts there; 0 if it approaches nowhere.
 
     First in the middle of its patch, then where it approaches fastest: a face that lands flat is thus pushed in its
     middle and does not start to spin.
     """
     point = _middle(points, count)
-    parting, tolerance = _approach(constants, state, i, j, point, offset, normal)
+    parting, tolerance = _approach(still, constants, state, i, j, point, offset, normal)
     if parting >= -tolerance:
         parting = 0.0
         for k in range(count):
-            at_corner, small = _approach(constants, state, i, j, row(points, k), offset, normal)
+            at_corner, small = _approach(still, constants, state, i, j, row(points, k), offset, normal)
             if at_corner < parting and at_corner < -small:
                 parting, point = at_corner, row(points, k)
     return point, parting
@@ -161,13 +161,15 @@ def answer(table, world, constants, state, contacts, count, whom, size, tally):
         for c in range(count):
             i, j = contacts[c, 0], contacts[c, 1]
             normal, offset = row(normals, c), row(offsets, c)
-            point, parting = _point_to_answer(constants, state, i, j, points[c], corners[c], offset, normal)
+            point, parting = _point_to_answer(
+                world.still, constants, state, i, j, points[c], corners[c], offset, normal
+            )
             impulse[c] = 0.0
             if parting < 0.0:
                 inverse_mass = _inverse_mass_at(constants, state, i, point, normal)
                 if j >= 0:
                     inverse_mass += _inverse_mass_at(constants, state, j, sub(point, offset), normal)
-                e, resting = _restitution(world, constants, i, j)
+                e, resting = restitution_of(world, constants, i, j)
                 stop = -parting / inverse_mass
                 bounce = 2.0 if -parting <= resting else 1.0 + e
                 impulse[c] = bounce * stop

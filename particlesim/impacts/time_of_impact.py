@@ -14,7 +14,7 @@ acceleration) at time 0.
 
 import math
 
-from particlesim.constants import IMPACT_TOLERANCE, SINKING, SPHERE
+from particlesim.constants import IMPACT_TOLERANCE, SPHERE
 from particlesim.jit import kernel
 from particlesim.motion import free_rotation, spin_of
 from particlesim.narrow_phase.pair import nearest_image, pair_separation
@@ -247,12 +247,11 @@ def _longest_proven_step(
 
 
 @kernel
-def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wall, start, end, parted, points):
+def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wall, start, end, sunk, points):
     """When the separation of two bodies first falls to nothing in ``start .. end`` [s]; inf if it does not.
 
-    The partner is wall ``wall``, or body j if that is -1. With ``parted`` they touch at the start and part: then it
-    is when they have sunk into each other by SINKING of their sizes, which ends the search among touches that are
-    only rounding. At the moment returned they are apart, by IMPACT_TOLERANCE of their sizes at the most.
+    The partner is wall ``wall``, or body j if that is -1. With ``sunk`` [m] it is when the separation falls to minus
+    that. At the moment returned it is larger, by IMPACT_TOLERANCE of their sizes at the most.
     """
     vertex, vertex_start = table.vertex, table.vertex_start
     kind_i, kind_j = table.kind[body_i[0]], table.kind[body_j[0]]
@@ -269,7 +268,6 @@ def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wal
     bend += norm(acceleration)
     way = norm(velocity) + norm(acceleration) * end
     time = start
-    sunk = math.inf
     for _ in range(_MAX_LOOKS):
         x, q, w = _place(kind_i, body_i, path_i, time)
         p, u = q, (0.0, 0.0, 0.0)
@@ -281,8 +279,6 @@ def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wal
             y, p, u = _place(kind_j, body_j, path_j, time)
             offset = nearest_image(sub(y, x), period)
             gap, normal = pair_separation(table, body_i[0], body_i[1], q, body_j[0], body_j[1], p, offset, points)
-        if sunk == math.inf:
-            sunk = max(0.0, -gap) + SINKING * sizes if parted else 0.0
         gap += sunk
         if gap <= IMPACT_TOLERANCE * sizes:
             return time

@@ -17,9 +17,9 @@ _ON_EDGE = 1e-9
 
 
 @kernel
-def _flattest_edge(edge, first, last, vertices, corner, direction):
-    """The other end of the edge at ``corner`` that runs across ``direction``, within PARALLEL_TOLERANCE; -1 if none."""
-    other, least = -1, PARALLEL_TOLERANCE
+def _flattest_edge(edge, first, last, vertices, corner, direction, tilt):
+    """The other end of the edge at ``corner`` that runs across ``direction``, within ``tilt``; -1 if none."""
+    other, least = -1, tilt
     for e in range(first, last):
         if edge[e, 0] == corner or edge[e, 1] == corner:
             end = edge[e, 0] + edge[e, 1] - corner
@@ -31,10 +31,11 @@ def _flattest_edge(edge, first, last, vertices, corner, direction):
 
 
 @kernel
-def facing_feature(table, shape, size, matrix, offset, direction, feature):
+def facing_feature(table, shape, size, matrix, offset, direction, tilt, feature):
     """Write the face, edge or vertex of a hull that faces ``direction``; returns (corners, whether it is a face).
 
-    ``feature`` is (MAX_CORNERS, 3); ``offset`` is the hull's centroid.
+    Faces and edges may be inclined by ``tilt`` [sine of the angle]. ``feature`` is (MAX_CORNERS, 3); ``offset`` is
+    the hull's centroid.
     """
     local = apply_transposed(matrix, direction)
     # Taken out of their struct once: each access counts references, which costs more than the arithmetic.
@@ -42,7 +43,7 @@ def facing_feature(table, shape, size, matrix, offset, direction, feature):
     vertices = table.vertex[table.vertex_start[shape] : table.vertex_start[shape + 1]]
     for f in range(table.face_start[shape], table.face_start[shape + 1]):
         n = row(face_normal, f)
-        if dot(n, local) > 0.0 and norm(cross(n, local)) < PARALLEL_TOLERANCE:
+        if dot(n, local) > 0.0 and norm(cross(n, local)) < tilt:
             first, last = loop_start[f], loop_start[f + 1]
             for k in range(first, last):
                 put(feature, k - first, add(offset, apply(matrix, scaled(row(vertices, loop[k]), size))))
@@ -53,7 +54,9 @@ def facing_feature(table, shape, size, matrix, offset, direction, feature):
         if r > reach:
             best, reach = v, r
     put(feature, 0, add(offset, apply(matrix, scaled(row(vertices, best), size))))
-    other = _flattest_edge(table.edge, table.edge_start[shape], table.edge_start[shape + 1], vertices, best, local)
+    other = _flattest_edge(
+        table.edge, table.edge_start[shape], table.edge_start[shape + 1], vertices, best, local, tilt
+    )
     if other < 0:
         return 1, False
     put(feature, 1, add(offset, apply(matrix, scaled(row(vertices, other), size))))
@@ -111,17 +114,20 @@ def _shared_by_edges(edge_a, edge_b, points):
 
 
 @kernel
-def hull_patch(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset, normal, separation, middle, points):
+def hull_patch(
+    table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset, normal, separation, middle, tilt, points, gaps
+):
     """Write the contact points of two hulls, half way between them, relative to a's centroid; returns how many.
 
-    ``normal`` points from a to b. ``middle`` stands in where features that are parallel only within the tolerance
-    share no point. ``points`` is (MAX_MANIFOLD, 3).
+    ``normal`` points from a to b. Faces and edges inclined by less than ``tilt`` [sine of the angle] touch along a
+    patch; ``middle`` stands in where such features share no point. ``points`` is (MAX_MANIFOLD, 3), ``gaps`` how far
+    apart the hulls are at each of them.
     """
     of_a, of_b = np.empty((MAX_CORNERS, 3)), np.empty((MAX_CORNERS, 3))
     spare = np.empty((MAX_CORNERS, 3))
     back = scaled(normal, -1.0)
-    count_a, face_a = facing_feature(table, shape_a, size_a, matrix_a, (0.0, 0.0, 0.0), normal, of_a)
-    count_b, face_b = facing_feature(table, shape_b, size_b, matrix_b, offset, back, of_b)
+    count_a, face_a = facing_feature(table, shape_a, size_a, matrix_a, (0.0, 0.0, 0.0), normal, tilt, of_a)
+    count_b, face_b = facing_feature(table, shape_b, size_b, matrix_b, offset, back, tilt, of_b)
     patch, shift = of_a, 0.5 * separation
     if count_a == 1:
         count = 1
@@ -137,8 +143,15 @@ def hull_patch(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offs
         count = _shared_by_edges(of_a, of_b, spare)
     if count == 0:
         put(points, 0, middle)
+        gaps[0] = separation
         return 1
     kept = min(count, MAX_MANIFOLD)
     for k in range(kept):
-        put(points, k, along(row(patch, k * count // kept), normal, shift))
+        corner = row(patch, k * count // kept)
+        put(points, k, along(corner, normal, shift))
+        gaps[k] = separation
+        if face_a and count_b > 1:
+            gaps[k] = dot(normal, sub(corner, row(of_a, 0)))
+        elif face_b and count_a > 1:
+            gaps[k] = dot(normal, sub(row(of_b, 0), corner))
     return kept

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from particlesim.constants import MAX_MANIFOLD, SPHERE
+from particlesim.constants import MAX_MANIFOLD, PARALLEL_TOLERANCE, SPHERE
 from particlesim.jit import kernel
 from particlesim.narrow_phase.manifold import MAX_CORNERS, facing_feature
 from particlesim.vec import apply, dot, matrix_of, put, row, scaled
@@ -47,7 +47,9 @@ def wall_contact(table, world, wall, shape, size, turn, position, points):
         put(points, 0, scaled(outwards, 0.5 * size))
         return separation, 1
     feature = np.empty((MAX_CORNERS, 3))
-    count, _ = facing_feature(table, shape, size, matrix_of(turn), (0.0, 0.0, 0.0), outwards, feature)
+    count, _ = facing_feature(
+        table, shape, size, matrix_of(turn), (0.0, 0.0, 0.0), outwards, PARALLEL_TOLERANCE, feature
+    )
     kept = min(count, MAX_MANIFOLD)
     for k in range(kept):
         put(points, k, row(feature, k * count // kept))
