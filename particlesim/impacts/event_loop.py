@@ -7,14 +7,14 @@ import math
 
 import numpy as np
 
-from particlesim.constants import MAX_IMPACTS, MAX_MANIFOLD, SIMULTANEOUS
+from particlesim.constants import MAX_IMPACTS, MAX_MANIFOLD, MAX_SLOW_IMPACTS, SIMULTANEOUS
 from particlesim.impacts.course import NOTHING_MET, PIECE, UNCHAINED, path_of_state, write_piece
 from particlesim.impacts.next_impact import body_of, later, pair_meets, wall_meets
-from particlesim.impacts.response import answer
+from particlesim.impacts.response import LANDED, NOTHING, STRUCK, answer
 from particlesim.impacts.sieve import grown
 from particlesim.jit import borrowed, kernel
 from particlesim.narrow_phase.contacts import wall_as_partner
-from particlesim.vec import put, put4, row, vector
+from particlesim.vec import dot, put, put4, row, vector
 
 
 @kernel
@@ -129,6 +129,18 @@ def _bring(state, course, constants, i, time):
 
 
 @kernel
+def _pull_after(world, state, outcome, i):
+    """The acceleration of a particle after an impact: gravity, or nothing if it landed.
+
+    What is struck is held no more. What landed is, unless it rises: without gravity it would gain energy.
+    """
+    gravity = vector(world.gravity)
+    if outcome == LANDED and dot(gravity, row(state.velocity, i)) >= 0.0:
+        gravity = (0.0, 0.0, 0.0)
+    return gravity
+
+
+@kernel
 def _begin(met, times, first_met, stamp, members, heap):
     """Put the impacts on the paths that all members are on at the start on an empty heap."""
     for i in members:
@@ -176,7 +188,7 @@ def run_islands(
         heap.clear()
         members = member[edges[k] : edges[k + 1]]
         _begin(met, times, first_met, stamp, members, heap)
-        left = MAX_IMPACTS * len(members)
+        left, slow_left = MAX_IMPACTS * len(members), MAX_SLOW_IMPACTS * len(members)
         while left > 0:
             time, count, size = _moment(heap, stamp, SIMULTANEOUS * duration, contacts, whom)
             if count == 0:
@@ -192,18 +204,32 @@ def run_islands(
                     pieces += 1
                     head[i] = UNCHAINED
                 _bring(state, course, constants, i, time)
-            answered = answer(table, world, constants, state, contacts, count, whom, size, tally[members[0]])
+            outcome = answer(
+                table,
+                world,
+                constants,
+                state,
+                course.acceleration,
+                contacts,
+                count,
+                whom,
+                size,
+                slow_left <= 0,
+                tally[members[0]],
+            )
+            slow_left -= outcome != STRUCK
+            if outcome == NOTHING and slow_left < 0:
+                continue
             for m in range(size):
                 i = whom[m]
                 stamp[i] += 1
-                if answered:
-                    # Whatever held it up before the stretch need not do so any more.
-                    put(course.acceleration, i, vector(world.gravity))
+                if outcome != NOTHING:
+                    put(course.acceleration, i, _pull_after(world, state, outcome, i))
                 write_piece(piece, pieces, time, state, course.acceleration, i)
                 particle[pieces, 0] = i
                 pieces += 1
             # What touches and was found not to approach must not be foretold for this moment again.
-            soonest = 0.0 if answered else SIMULTANEOUS * duration
+            soonest = SIMULTANEOUS * duration if outcome == NOTHING else 0.0
             for m in range(size):
                 _foretell(
                     table, world, constants, state, course, start, other, whom, m, soonest, duration, heap, points

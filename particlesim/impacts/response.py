@@ -17,6 +17,10 @@ from particlesim.motion import particle_spin, spin_of
 from particlesim.narrow_phase.contacts import contact_now, wall_of_partner
 from particlesim.vec import add, along, cross, dot, norm, put, row, row4, scaled, sub, vector
 
+# What came of contacts: they did not approach, met fast, met slowly and rebounded in full until they come to rest, or
+# met slowly what is held.
+NOTHING, STRUCK, REBOUNDED, LANDED = 0, 1, 2, 3
+
 # Columns of an island's tally: impacts, the virial, then the impulse on each of six walls.
 IMPACTS, VIRIAL, WALLS = 0, 1, 2
 TALLY = 8
@@ -136,10 +140,29 @@ def _tell(tally, j, impulse, offset, normal):
 
 
 @kernel
-def answer(table, world, constants, state, contacts, count, whom, size, tally):
+def _is_held(acceleration, i):
+    """Whether particle ``i`` is held for the present stretch of time (see resting.py); walls are."""
+    return i < 0 or (acceleration[i, 0] == 0.0 and acceleration[i, 1] == 0.0 and acceleration[i, 2] == 0.0)
+
+
+@kernel
+def _bounce(world, constants, acceleration, i, j, speed):
+    """What comes of partners that approach at a ``speed`` [m/s], and the factor on the impulse that would stop them."""
+    restitution, resting = restitution_of(world, constants, i, j)
+    if restitution == 1.0 or speed > resting:
+        return STRUCK, 1.0 + restitution
+    if _is_held(acceleration, i) or _is_held(acceleration, j):
+        return LANDED, 1.0
+    return REBOUNDED, 2.0
+
+
+@kernel
+def answer(table, world, constants, state, acceleration, contacts, count, whom, size, leave_slow, tally):
     """Answer ``count`` contacts (particle, partner) of one moment until nothing in them approaches.
 
-    ``whom`` lists the ``size`` particles in them. Returns whether anything approached at all; adds to ``tally``.
+    ``whom`` lists the ``size`` particles in them; with ``leave_slow`` those that may come to rest are left to
+    the next stretch of time. Adds to ``tally`` and returns what came of it: NOTHING if nothing approached, else
+    the first of STRUCK, REBOUNDED and LANDED that happened anywhere.
     """
     points = np.empty((count, MAX_MANIFOLD, 3))
     corners = np.empty(count, dtype=np.int64)
@@ -153,6 +176,7 @@ def answer(table, world, constants, state, contacts, count, whom, size, tally):
         put(normals, c, normal)
         put(offsets, c, offset)
         answered[c] = False
+    outcome = NOTHING
     for _ in range(MAX_PATCH_IMPULSES):
         for k in range(size):
             put(push, k, (0.0, 0.0, 0.0))
@@ -169,9 +193,11 @@ def answer(table, world, constants, state, contacts, count, whom, size, tally):
                 inverse_mass = _inverse_mass_at(constants, state, i, point, normal)
                 if j >= 0:
                     inverse_mass += _inverse_mass_at(constants, state, j, sub(point, offset), normal)
-                e, resting = restitution_of(world, constants, i, j)
                 stop = -parting / inverse_mass
-                bounce = 2.0 if -parting <= resting else 1.0 + e
+                what, bounce = _bounce(world, constants, acceleration, i, j, -parting)
+                if leave_slow and what != STRUCK:
+                    continue
+                outcome = what if outcome == NOTHING else min(outcome, what)
                 impulse[c] = bounce * stop
                 work += impulse[c] * parting
                 loss += bounce * bounce * stop * -parting
@@ -199,4 +225,4 @@ def answer(table, world, constants, state, contacts, count, whom, size, tally):
     for c in range(count):
         impacts += answered[c]
     tally[IMPACTS] += impacts
-    return impacts > 0
+    return outcome

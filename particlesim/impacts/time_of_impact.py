@@ -22,7 +22,7 @@ from particlesim.narrow_phase.walls import wall_normal, wall_separation
 from particlesim.vec import add, along, cross, dot, norm, rotate, rotate_back, row, scaled, sub
 
 # Looks at the separation in one search, which ends where it is then. Few searches take more than ten.
-_MAX_LOOKS = 200
+_MAX_LOOKS = 60
 
 # Refinements of a proven step, which is shorter than it could be where other corners come to the fore.
 _REFINEMENTS = 3
