@@ -43,7 +43,7 @@ STILL = 1e-6
 MAX_IMPACTS = 1000
 
 # The same for impacts of what comes to rest: the next stretch begins with all their contacts at once.
-MAX_SLOW_IMPACTS = 10
+MAX_SLOW_IMPACTS = 100
 
 # Times that islands are joined within one stretch of time before it is tried in two halves.
 MAX_ROUNDS = 40

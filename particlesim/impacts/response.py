@@ -17,9 +17,9 @@ from particlesim.motion import particle_spin, spin_of
 from particlesim.narrow_phase.contacts import contact_now, wall_of_partner
 from particlesim.vec import add, along, cross, dot, norm, put, row, row4, scaled, sub, vector
 
-# What came of contacts: they did not approach, met fast, met slowly and rebounded in full until they come to rest, or
-# met slowly what is held.
-NOTHING, STRUCK, REBOUNDED, LANDED = 0, 1, 2, 3
+# What came of contacts: they did not approach, met fast, met slowly and rebounded in full until they come to rest, met
+# slowly what is held, or are both held, to where they do not close by more than rounding until the next stretch.
+NOTHING, STRUCK, REBOUNDED, LANDED, LEFT = 0, 1, 2, 3, 4
 
 # Columns of an island's tally: impacts, the virial, then the impulse on each of six walls.
 IMPACTS, VIRIAL, WALLS = 0, 1, 2
@@ -140,7 +140,7 @@ def _tell(tally, j, impulse, offset, normal):
 
 
 @kernel
-def _is_held(acceleration, i):
+def is_held(acceleration, i):
     """Whether particle ``i`` is held for the present stretch of time (see resting.py); walls are."""
     return i < 0 or (acceleration[i, 0] == 0.0 and acceleration[i, 1] == 0.0 and acceleration[i, 2] == 0.0)
 
@@ -151,7 +151,9 @@ def _bounce(world, constants, acceleration, i, j, speed):
     restitution, resting = restitution_of(world, constants, i, j)
     if restitution == 1.0 or speed > resting:
         return STRUCK, 1.0 + restitution
-    if _is_held(acceleration, i) or _is_held(acceleration, j):
+    if is_held(acceleration, i) and is_held(acceleration, j):
+        return LEFT, 0.0
+    if is_held(acceleration, i) or is_held(acceleration, j):
         return LANDED, 1.0
     return REBOUNDED, 2.0
 
@@ -195,7 +197,7 @@ def answer(table, world, constants, state, acceleration, contacts, count, whom, 
                     inverse_mass += _inverse_mass_at(constants, state, j, sub(point, offset), normal)
                 stop = -parting / inverse_mass
                 what, bounce = _bounce(world, constants, acceleration, i, j, -parting)
-                if leave_slow and what != STRUCK:
+                if what == LEFT or (leave_slow and what != STRUCK):
                     continue
                 outcome = what if outcome == NOTHING else min(outcome, what)
                 impulse[c] = bounce * stop
