@@ -59,16 +59,17 @@ def _size_class(width, widest):
 @kernel
 def _fill_codes(first, last, lower, upper, period, origin, inverse, widest, codes):
     """Codes of boxes ``first .. last`` in a root cube at ``origin`` (3,) [m] of edge 1 / ``inverse`` [m]."""
+    period_x, period_y, period_z = period[0], period[1], period[2]
+    origin_x, origin_y, origin_z = origin[0], origin[1], origin[2]
     for index in range(first, last):
-        width = 0.0
-        for axis in range(3):
-            width = max(width, upper[index, axis] - lower[index, axis])
+        a, b, c = lower[index, 0], lower[index, 1], lower[index, 2]
+        d, e, f = upper[index, 0], upper[index, 1], upper[index, 2]
         code = octants(
-            (wrapped_centre(lower[index, 0], upper[index, 0], period[0]) - origin[0]) * inverse,
-            (wrapped_centre(lower[index, 1], upper[index, 1], period[1]) - origin[1]) * inverse,
-            (wrapped_centre(lower[index, 2], upper[index, 2], period[2]) - origin[2]) * inverse,
+            (wrapped_centre(a, d, period_x) - origin_x) * inverse,
+            (wrapped_centre(b, e, period_y) - origin_y) * inverse,
+            (wrapped_centre(c, f, period_z) - origin_z) * inverse,
         )
-        codes[index] = _size_class(width, widest) << CLASS_SHIFT | code
+        codes[index] = _size_class(max(d - a, e - b, f - c), widest) << CLASS_SHIFT | code
 
 
 def codes_of(

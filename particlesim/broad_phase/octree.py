@@ -34,6 +34,10 @@ _STACK = 8 * (LEVELS + 3)
 # Rounding of float32 coordinates and of their sums: four units in the last place.
 _ROUNDING = 2.0**-22
 
+# Where no axis is periodic.
+_NO_SHIFT = np.zeros((1, 3), dtype=np.float32)
+_NO_MARGIN = np.zeros(3, dtype=np.float32)
+
 
 @kernel
 def _moved(box, shift, margin):
@@ -168,6 +172,8 @@ def _search(first, last, leaves, nodes, bounds, columns, boxes, order, shifts, m
 
 def _images(period: np.ndarray, seen: Survey, scale: float) -> tuple[np.ndarray, np.ndarray]:
     """Shifts (k, 3) to all images that can be nearest, none first, and the margin (3,) for rounding; in columns."""
+    if not period.any():
+        return _NO_SHIFT, _NO_MARGIN
     axes = [(0.0, length, -length) if length > 0.0 else (0.0,) for length in (scale * period).tolist()]
     shifts = np.array(list(itertools.product(*axes)), dtype=np.float32)
     margin = scale * np.where(period > 0.0, _ROUNDING * (2.0 * period + seen.widest) + seen.slack, 0.0)
