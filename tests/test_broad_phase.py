@@ -181,6 +181,13 @@ class TestContract:
                 half = 0.3 * rng.random(count) ** 3
                 check(search, *boxes(rng.normal(0.0, scale, (count, 3)), half), period)
 
+    @pytest.mark.parametrize("period", [None, (1.0, 1.0, 1.0)])
+    def test_many_coincide_where_splitting_ends(self, search, period):
+        """More boxes at one place than a leaf holds or a batch takes, and some beside them."""
+        rng = np.random.default_rng(16)
+        centre = np.concatenate([np.full((900, 3), 0.7), np.full((300, 3), 0.1), rng.random((50, 3))])
+        check(search, *boxes(centre, np.repeat([0.0, 0.15, 0.02], [900, 300, 50])), period)
+
     def test_order_of_the_boxes_does_not_matter(self, search):
         rng = np.random.default_rng(10)
         lower, upper = boxes(rng.random((500, 3)), 0.05)
@@ -197,7 +204,60 @@ class TestContract:
         np.testing.assert_array_equal(search(lower, upper), pairs)
 
 
-LARGE_SCENES = ("uniform", "periodic", "clustered", "sizes", "one giant", "crowded")
+def brute_force_of_each(lower, upper, period):
+    """Rows (scene, i, j), i < j, of boxes that overlap, of scenes (s, n, 3) with periods (s, 3) each.
+
+    Two periods either way are tried, which suffices for boxes within a period of the origin.
+    """
+    overlap = np.ones((len(lower), lower.shape[1], lower.shape[1]), dtype=bool)
+    for axis in range(3):
+        low, high = lower[:, :, axis], upper[:, :, axis]
+        meets = np.zeros_like(overlap)
+        for turns in range(-2, 3):
+            shift = (turns * period[:, axis])[:, None, None]
+            meets |= (low[:, :, None] <= high[:, None] + shift) & (low[:, None] + shift <= high[:, :, None])
+        overlap &= meets
+    return np.argwhere(np.triu(overlap, 1))
+
+
+def few_particles(rng, scenes):
+    """Scenes of five boxes within a period of the origin; all numbers are multiples of 1/16, so touches are exact."""
+    shape = (scenes, 5, 3)
+    lower = rng.integers(-16, 16, shape) / 16.0
+    largest = 2 ** rng.integers(0, 6, (scenes, 5, 1))  # from points to boxes of one and a half times the period
+    edges = rng.integers(0, 32, shape) % largest / 16.0
+    return lower, lower + edges, rng.choice([0.0, 1.0, 1.25], (scenes, 3))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_thousands_of_scenes_of_few_particles(method):
+    lower, upper, period = few_particles(np.random.default_rng(17), 20_000)
+    found = [METHODS[method](*scene)[0] for scene in zip(lower, upper, period, strict=True)]
+    numbers = np.repeat(np.arange(len(found)), [len(pairs) for pairs in found])
+    rows = np.column_stack([numbers, np.concatenate(found)])
+    np.testing.assert_array_equal(rows, brute_force_of_each(lower, upper, period))
+
+
+@pytest.mark.parametrize("method", ["grid", "octree"])
+def test_a_hundred_thousand_scenes_side_by_side(method):
+    """Scenes of few particles 8 m apart, all in one call, in an order that has nothing to do with where they are."""
+    lower, upper, _ = few_particles(np.random.default_rng(18), 100_000)
+    rows = brute_force_of_each(lower, upper, np.zeros((100_000, 3)))
+    place = 8.0 * np.stack(np.unravel_index(np.arange(100_000), (50, 50, 40)), axis=1)[:, None]
+    mixed = np.random.default_rng(19).permutation(500_000)
+    number = np.empty(500_000, dtype=np.int64)
+    number[mixed] = np.arange(500_000)
+    expected = np.sort(number[5 * rows[:, :1] + rows[:, 1:]], axis=1)
+    pairs, _ = METHODS[method](
+        (lower + place).reshape(-1, 3)[mixed], (upper + place).reshape(-1, 3)[mixed], np.zeros(3)
+    )
+    np.testing.assert_array_equal(pairs, expected[np.lexsort((expected[:, 1], expected[:, 0]))])
+
+
+LARGE_SCENES = (
+    "uniform", "periodic", "clustered", "sizes", "one giant", "crowded", "a thousand to one", "periodic sizes",
+    "flat", "sparse",
+)  # fmt: skip
 
 
 def large_scene(name, count=20000):
@@ -218,6 +278,16 @@ def large_scene(name, count=20000):
         half[count // 2] = 0.4
     elif name == "crowded":
         half *= 2.0  # more pairs than the first lists hold
+    elif name == "a thousand to one":
+        half = 0.05 * 1000.0 ** -rng.random(count)
+    elif name == "periodic sizes":
+        period[:] = 1.0, 0.0, 1.0
+        half = 0.03 * 100.0 ** -rng.random(count)
+    elif name == "flat":
+        centre[:, 2] = 0.5
+        half *= 0.1
+    elif name == "sparse":
+        half *= 0.01  # many more cells than boxes
     return *boxes(centre, half), period
 
 

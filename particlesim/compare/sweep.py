@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -75,8 +76,8 @@ class Sweep:
 
 def sizes_up_to(largest: int) -> list[int]:
     """1, 3.16, 10 ... times a hundred, up to ``largest``."""
-    steps = max(0, math.floor(2.0 * math.log10(largest / 100.0) + 1e-9))
-    return [round(100.0 * 10.0 ** (0.5 * step)) for step in range(steps + 1)]
+    sizes = (round(100.0 * 10.0 ** (0.5 * step)) for step in itertools.count())
+    return list(itertools.takewhile(lambda size: size <= largest, sizes))
 
 
 def sweep(
