@@ -49,8 +49,8 @@ def _moved(box, shift, margin):
 
 
 @kernel
-def _near_leaves(leaf, box, nodes, bounds, stack, near_leaves):
-    """Leaves before ``leaf`` whose bounds may overlap ``box``, into ``near_leaves``; how many."""
+def _find_near(leaf, box, nodes, bounds, stack, ranges):
+    """Ranges of the leaves before ``leaf`` whose bounds may overlap ``box``, into rows of ``ranges``; how many."""
     own = nodes[leaf, START]
     stack[0] = 0
     size = np.uint64(nodes[0, CHILDREN] > 0)
@@ -68,25 +68,48 @@ def _near_leaves(leaf, box, nodes, bounds, stack, near_leaves):
                     stack[size] = near
                     size += np.uint64(1)
                 else:
-                    near_leaves[found] = near
+                    ranges[found, 0] = nodes[near, START]
+                    ranges[found, 1] = nodes[near, STOP]
                     found += np.uint64(1)
     return np.int64(found)
 
 
 @kernel
-def _list_near(start, stop, box, columns, near, places, size):
-    """Add the columns ``start .. stop`` that may overlap ``box`` to the list ``near``; the new ``size``."""
-    for base in range(start, stop, LANES):
-        bits = overlap_bits(columns, np.uint64(base), box) & ((1 << min(LANES, stop - base)) - 1)
-        while bits:
-            place = np.uint64(base) + lowest(bits)
-            bits &= bits - 1
-            slot = np.uint64(size)
-            for row in range(6):
-                near[row, slot] = columns[row, place]
-            places[slot] = place
-            size += 1
-    return size
+def _list_near(ranges, slot, number, box, columns, near, places):
+    """List the columns in ``ranges`` from row ``slot`` on that may overlap ``box``, until the list is full.
+
+    Returns the row it has come to, which then starts where the list ends, and the length of the list.
+    """
+    size = np.uint64(0)
+    while slot < number:
+        base = int(ranges[slot, 0])
+        stop = int(ranges[slot, 1])
+        while base < stop:
+            if size > np.uint64(_LIST - LANES):
+                ranges[slot, 0] = base
+                return slot, np.int64(size)
+            bits = overlap_bits(columns, np.uint64(base), box) & ((1 << min(LANES, stop - base)) - 1)
+            while bits:
+                place = np.uint64(base) + lowest(bits)
+                bits &= bits - 1
+                for row in range(6):
+                    near[row, size] = columns[row, place]
+                places[size] = place
+                size += np.uint64(1)
+            base += LANES
+        slot += 1
+    return slot, np.int64(size)
+
+
+@kernel
+def _list_own(first, last, columns, near, places, size):
+    """Add the columns ``first .. last`` to the list."""
+    slot = np.uint64(size)
+    for place in range(first, last):
+        for row in range(6):
+            near[row, slot] = columns[row, place]
+        places[slot] = place
+        slot += np.uint64(1)
 
 
 @kernel
@@ -121,9 +144,9 @@ def _search(first, last, leaves, nodes, bounds, columns, boxes, order, shifts, m
     """Pairs within the leaves ``first .. last`` and between them and the leaves before them: (found, tested)."""
     wraps = any_wraps(period)
     stack = np.empty(_STACK, dtype=np.uint32)
-    near_leaves = np.empty(leaves.size, dtype=np.uint32)
-    near = np.zeros((6, _LIST + LANES), dtype=np.float32)
-    places = np.empty(_LIST + LANES, dtype=np.uint32)
+    ranges = np.empty((leaves.size, 2), dtype=np.int32)
+    near = np.zeros((6, _LIST + _OWN + LANES), dtype=np.float32)
+    places = np.empty(_LIST + _OWN + LANES, dtype=np.uint32)
     candidates = np.empty((2, BATCH), dtype=np.uint32)
     waiting = 0
     found = 0
@@ -138,31 +161,22 @@ def _search(first, last, leaves, nodes, bounds, columns, boxes, order, shifts, m
             box = _moved(column_of(bounds, leaf), shift, reach)
             if not may_overlap(box, column_of(bounds, 0)):
                 continue
-            size = 0
-            for slot in range(_near_leaves(leaf, box, nodes, bounds, stack, near_leaves)):
-                other = near_leaves[slot]
-                for base in range(nodes[other, START], nodes[other, STOP], _OWN):
-                    end = min(base + _OWN, int(nodes[other, STOP]))
-                    size = _list_near(base, end, box, columns, near, places, size)
-                    if size > _LIST - _OWN:
-                        waiting, found, tests = _test_list(
-                            start, stop, size, 0, near, places, shift, reach,
-                            columns, boxes, order, period, wraps, candidates, waiting, keys, found,
-                        )  # fmt: skip
-                        tested += tests
-                        size = 0
-            if image > 0 and not may_overlap(box, column_of(bounds, leaf)) and size == 0:
-                continue
+            near_ranges = _find_near(leaf, box, nodes, bounds, stack, ranges)
+            slot, size = _list_near(ranges, 0, near_ranges, box, columns, near, places)
+            while slot < near_ranges:
+                waiting, found, tests = _test_list(
+                    start, stop, size, 0, near, places, shift, reach,
+                    columns, boxes, order, period, wraps, candidates, waiting, keys, found,
+                )  # fmt: skip
+                tested += tests
+                slot, size = _list_near(ranges, slot, near_ranges, box, columns, near, places)
+            if size == 0 and not may_overlap(box, column_of(bounds, leaf)):
+                continue  # an image that does not meet its own
             for base in range(start, stop, _OWN):
                 end = min(base + _OWN, stop)
-                before = size
-                for place in range(base, end):
-                    for row in range(6):
-                        near[row, size] = columns[row, place]
-                    places[size] = place
-                    size += 1
+                _list_own(base, end, columns, near, places, size)
                 waiting, found, tests = _test_list(
-                    base, stop, before, end - base, near, places, shift, reach,
+                    base, stop, size, end - base, near, places, shift, reach,
                     columns, boxes, order, period, wraps, candidates, waiting, keys, found,
                 )  # fmt: skip
                 tested += tests
