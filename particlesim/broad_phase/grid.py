@@ -18,8 +18,8 @@ from particlesim.broad_phase.survey import survey
 from particlesim.crew import Crew
 from particlesim.jit import kernel
 
-# Boxes whose candidates are listed before they are tested.
-_AT_ONCE = 1024
+# Ranges of candidates that are listed before they are tested, or as many as one box has: 192 kB.
+_RANGES = 16384
 
 # Bands of buckets, 2**9 at most; up to _FEW boxes are one band.
 _BAND_BITS = 9
@@ -164,12 +164,14 @@ def _search_cells(first, last, boxes, order, buckets, starts, shape, reach, arou
     """Pairs of boxes in the cells, the earlier of which lies in ``first .. last``: (found, tested)."""
     wraps = any_wraps(period)
     rows = np.empty((reach[2] + 1) * (2 * reach[1] + 1), dtype=np.int64)
-    ranges = np.empty((_AT_ONCE * (2 * rows.size + 2), 3), dtype=np.uint32)
+    most_ranges = 2 * rows.size + 2
+    at_once = max(1, _RANGES // most_ranges)
+    ranges = np.empty((at_once * most_ranges, 3), dtype=np.uint32)
     candidates = np.empty((2, BATCH), dtype=np.uint32)
     found = 0
     tested = 0
-    for start in range(first, last, _AT_ONCE):
-        stop = min(last, start + _AT_ONCE)
+    for start in range(first, last, at_once):
+        stop = min(last, start + at_once)
         number = _add_ranges(start, stop, buckets, starts, shape, reach, around, rows, ranges)
         found, tests = _append_ranges(ranges, number, candidates, boxes, order, period, wraps, keys, found)
         tested += tests
@@ -195,7 +197,7 @@ def _add_row(index, row, left, number, length, starts, ranges, size):
 def _search_large(first, last, boxes, order, starts, cells, shape, origin, inverse, width, period, keys):
     """Pairs of boxes ``first .. last``, which are too large for the cells, with those in the cells."""
     wraps = any_wraps(period)
-    ranges = np.empty((2 * _AT_ONCE, 3), dtype=np.uint32)
+    ranges = np.empty((_RANGES, 3), dtype=np.uint32)
     candidates = np.empty((2, BATCH), dtype=np.uint32)
     size = 0
     found = 0
@@ -210,7 +212,7 @@ def _search_large(first, last, boxes, order, starts, cells, shape, origin, inver
             for line in range(number_y):
                 row = (near_z * shape[1] + (y + line) % shape[1]) * shape[0]
                 size = _add_row(index, row, x, number_x, shape[0], starts, ranges, size)
-                if size > 2 * _AT_ONCE - 2:
+                if size > _RANGES - 2:
                     found, tests = _append_ranges(ranges, size, candidates, boxes, order, period, wraps, keys, found)
                     tested += tests
                     size = 0
