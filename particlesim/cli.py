@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from particlesim.compare.command import Report
     from particlesim.scene import Scene
     from particlesim.summary import Summary
 
@@ -196,6 +197,55 @@ def check(scene: SceneArgument) -> None:
         _print_table(scene.name, survey(loaded))
 
 
+@app.command(short_help="Compare the broad phases on a scene, on a sweep or on a stream of boxes.")
+def compare(
+    source: Annotated[
+        Path | None, typer.Argument(metavar="[SCENE|STREAM]", help="A scene file, or an .aabb stream (Broadmark).")
+    ] = None,
+    sweep: Annotated[
+        str | None, typer.Option("--sweep", help="Instead: uniform, clustered or mixed boxes, 100 to a million.")
+    ] = None,
+    steps: Annotated[int | None, typer.Option("--steps", min=1, help="Time steps of a scene.  [default: 3 s]")] = None,
+    largest: Annotated[int, typer.Option("--largest", min=100, help="Boxes a sweep ends with.")] = 1_000_000,
+    limit: Annotated[float, typer.Option("--limit", min=0.0, help="Seconds after which a method is left out.")] = 10.0,
+    stream: Annotated[
+        Path | None, typer.Option("--stream", help="Also write the scene's frames as a stream (.aabb).")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="JSON, and SVG and PNG beside it.  [default: renders/]")
+    ] = None,
+    quiet: Quiet = False,
+    threads: Threads = None,
+) -> None:
+    """Run every broad phase on the same boxes: seconds, tests, memory, and proof that all give the same.
+
+    Exit code 1 if they do not.
+    """
+    if (source is None) == (sweep is None):
+        _fail("give a scene, a stream or --sweep, and one of them only", 2)
+    if stream is not None:
+        _check_output(stream, ".aabb")
+    with _one_line_errors(source or Path("compare")):
+        from particlesim.compare.command import on_scene, on_stream, on_sweep  # noqa: PLC0415
+        from particlesim.progress import shown_progress  # noqa: PLC0415
+
+        is_stream = source is not None and source.suffix.lower() == ".aabb"
+        scene = _load(source) if source is not None and not is_stream else None
+        with _output(output, Path(f"compare_{source.stem if source else sweep}"), ".json") as path:
+            with shown_progress(quiet, "particle" if sweep else "step") as progress:
+                settings: dict[str, Any] = {"limit": limit, "threads": threads, "progress": progress}
+                if scene is not None and source is not None:
+                    report = on_scene(scene, source.stem, path, stream, steps=steps, **settings)
+                elif source is not None:
+                    report = on_stream(source, path, **settings)
+                else:
+                    report = on_sweep(str(sweep), path, largest=largest, **settings)
+            if not quiet:
+                _print_report(report)
+    if not report.same:
+        _fail("the broad phases do not agree", 1)
+
+
 @app.command(short_help="Say what this machine has and what is missing.")
 def doctor() -> None:
     """Say what this machine has for simulating and drawing, and how to get what is missing."""
@@ -229,6 +279,13 @@ def _print_table(title: str, rows: list[tuple[str, Any]]) -> None:
         # As Text: square brackets in names of groups and files are no markup.
         table.add_row(Text(name), Text(str(value)))
     Console().print(table)
+
+
+def _print_report(report: Report) -> None:
+    from rich.console import Console  # noqa: PLC0415
+
+    Console().print(report.table)
+    print("\n".join(str(path) for path in report.written))
 
 
 def _print_summary(summary: Summary, path: Path) -> None:

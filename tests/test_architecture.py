@@ -17,6 +17,7 @@ FLOORS = [
     ["trajectory", "ledger", "scene"],
     ["insertion", "placement", "launch", "build"],
     ["simulation", "rendering"],
+    ["compare"],
     ["summary", "pipeline", "progress", "survey", "diagnosis", "cli", "__main__", "__init__"],
 ]
 FLOOR = {name: level for level, names in enumerate(FLOORS) for name in names}

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from particlesim.broad_phase import METHODS, find_pairs, octree_leaves
+from particlesim.broad_phase import METHODS, find_pairs
 from particlesim.crew import use_threads
 
 VARIANTS = {
@@ -181,6 +181,13 @@ class TestContract:
                 half = 0.3 * rng.random(count) ** 3
                 check(search, *boxes(rng.normal(0.0, scale, (count, 3)), half), period)
 
+    @pytest.mark.parametrize("period", [None, (1.0, 1.0, 1.0)])
+    def test_many_coincide_where_splitting_ends(self, search, period):
+        """More boxes at one place than a leaf holds or a batch takes, and some beside them."""
+        rng = np.random.default_rng(16)
+        centre = np.concatenate([np.full((900, 3), 0.7), np.full((300, 3), 0.1), rng.random((50, 3))])
+        check(search, *boxes(centre, np.repeat([0.0, 0.15, 0.02], [900, 300, 50])), period)
+
     def test_order_of_the_boxes_does_not_matter(self, search):
         rng = np.random.default_rng(10)
         lower, upper = boxes(rng.random((500, 3)), 0.05)
@@ -197,7 +204,60 @@ class TestContract:
         np.testing.assert_array_equal(search(lower, upper), pairs)
 
 
-LARGE_SCENES = ("uniform", "periodic", "clustered", "sizes", "one giant", "crowded")
+def brute_force_of_each(lower, upper, period):
+    """Rows (scene, i, j), i < j, of boxes that overlap, of scenes (s, n, 3) with periods (s, 3) each.
+
+    Two periods either way are tried, which suffices for boxes within a period of the origin.
+    """
+    overlap = np.ones((len(lower), lower.shape[1], lower.shape[1]), dtype=bool)
+    for axis in range(3):
+        low, high = lower[:, :, axis], upper[:, :, axis]
+        meets = np.zeros_like(overlap)
+        for turns in range(-2, 3):
+            shift = (turns * period[:, axis])[:, None, None]
+            meets |= (low[:, :, None] <= high[:, None] + shift) & (low[:, None] + shift <= high[:, :, None])
+        overlap &= meets
+    return np.argwhere(np.triu(overlap, 1))
+
+
+def few_particles(rng, scenes):
+    """Scenes of five boxes within a period of the origin; all numbers are multiples of 1/16, so touches are exact."""
+    shape = (scenes, 5, 3)
+    lower = rng.integers(-16, 16, shape) / 16.0
+    largest = 2 ** rng.integers(0, 6, (scenes, 5, 1))  # from points to boxes of one and a half times the period
+    edges = rng.integers(0, 32, shape) % largest / 16.0
+    return lower, lower + edges, rng.choice([0.0, 1.0, 1.25], (scenes, 3))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_thousands_of_scenes_of_few_particles(method):
+    lower, upper, period = few_particles(np.random.default_rng(17), 20_000)
+    found = [METHODS[method](*scene)[0] for scene in zip(lower, upper, period, strict=True)]
+    numbers = np.repeat(np.arange(len(found)), [len(pairs) for pairs in found])
+    rows = np.column_stack([numbers, np.concatenate(found)])
+    np.testing.assert_array_equal(rows, brute_force_of_each(lower, upper, period))
+
+
+@pytest.mark.parametrize("method", ["grid", "octree"])
+def test_a_hundred_thousand_scenes_side_by_side(method):
+    """Scenes of few particles 8 m apart, all in one call, in an order that has nothing to do with where they are."""
+    lower, upper, _ = few_particles(np.random.default_rng(18), 100_000)
+    rows = brute_force_of_each(lower, upper, np.zeros((100_000, 3)))
+    place = 8.0 * np.stack(np.unravel_index(np.arange(100_000), (50, 50, 40)), axis=1)[:, None]
+    mixed = np.random.default_rng(19).permutation(500_000)
+    number = np.empty(500_000, dtype=np.int64)
+    number[mixed] = np.arange(500_000)
+    expected = np.sort(number[5 * rows[:, :1] + rows[:, 1:]], axis=1)
+    pairs, _ = METHODS[method](
+        (lower + place).reshape(-1, 3)[mixed], (upper + place).reshape(-1, 3)[mixed], np.zeros(3)
+    )
+    np.testing.assert_array_equal(pairs, expected[np.lexsort((expected[:, 1], expected[:, 0]))])
+
+
+LARGE_SCENES = (
+    "uniform", "periodic", "clustered", "sizes", "one giant", "crowded", "a thousand to one", "periodic sizes",
+    "flat", "sparse",
+)  # fmt: skip
 
 
 def large_scene(name, count=20000):
@@ -218,6 +278,16 @@ def large_scene(name, count=20000):
         half[count // 2] = 0.4
     elif name == "crowded":
         half *= 2.0  # more pairs than the first lists hold
+    elif name == "a thousand to one":
+        half = 0.05 * 1000.0 ** -rng.random(count)
+    elif name == "periodic sizes":
+        period[:] = 1.0, 0.0, 1.0
+        half = 0.03 * 100.0 ** -rng.random(count)
+    elif name == "flat":
+        centre[:, 2] = 0.5
+        half *= 0.1
+    elif name == "sparse":
+        half *= 0.01  # many more cells than boxes
     return *boxes(centre, half), period
 
 
@@ -273,87 +343,3 @@ def test_every_method_takes_lists_that_grow():
     for method in METHODS:
         pairs, tested = METHODS[method](lower, upper, np.zeros(3))
         assert len(pairs) == tested == 300 * 299 // 2
-
-
-class TestGate:
-    GOOD = np.zeros((3, 3))
-
-    def bad(self, match, lower=GOOD, upper=GOOD, method="octree", **options):
-        with pytest.raises(ValueError, match=match):
-            find_pairs(lower, upper, method, **options)
-
-    def test_method(self):
-        self.bad("unknown method 'kd-tree', expected one of naive, grid, octree", method="kd-tree")
-
-    @pytest.mark.parametrize("wrong", [np.zeros(3), np.zeros((3, 2)), np.zeros((3, 3), dtype=np.float32)])
-    def test_shape_and_type(self, wrong):
-        self.bad(r"lower must be \(n, 3\) float64", lower=wrong)
-        self.bad(r"upper must be \(n, 3\) float64", upper=wrong)
-
-    def test_number(self):
-        self.bad("lower has 2 boxes, upper has 3", lower=np.zeros((2, 3)))
-
-    @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e200])
-    def test_finite(self, value):
-        wrong = np.zeros((3, 3))
-        wrong[1, 2] = value
-        self.bad("finite.*box 1", lower=wrong)
-        self.bad("finite.*box 1", upper=wrong)
-
-    def test_inverted(self):
-        wrong = np.zeros((3, 3))
-        wrong[2, 0] = -1e-300
-        self.bad("lower exceeds upper in 1 boxes, first in box 2", upper=wrong)
-
-    @pytest.mark.parametrize("period", [(1.0, 1.0), (1.0, -1.0, 1.0), (np.nan, 0.0, 0.0), 5.0])
-    def test_period(self, period):
-        self.bad("period must be three lengths", period=period)
-
-    def test_periods_away(self):
-        self.bad("periods from the origin", self.GOOD + 1e12, self.GOOD + 1e12, period=(1.0, 0.0, 0.0))
-
-    @pytest.mark.parametrize("options", [{"cells": 0}, {"cells": -3}])
-    def test_cells(self, options):
-        self.bad("cells must be at least 1", method="grid", **options)
-
-    @pytest.mark.parametrize("options", [{"max_count": 0}, {"max_depth": 0}, {"max_depth": 21}])
-    def test_octree(self, options):
-        self.bad("must be", method="octree", **options)
-
-
-class TestLeaves:
-    LOW, HIGH = np.array([-1.0, -2.0, 0.0]), np.array([3.0, 2.0, 1.0])
-
-    def leaves(self, centre, max_count, max_depth):
-        return octree_leaves(centre, centre, max_count, max_depth, self.LOW, self.HIGH)
-
-    def centres(self, count):
-        return self.LOW + np.random.default_rng(14).random((count, 3)) * (self.HIGH - self.LOW)
-
-    def test_world_alone(self):
-        for count in (0, 4):
-            lower, upper, depth = self.leaves(self.centres(count), 4, 5)
-            np.testing.assert_array_equal(lower, [self.LOW])
-            np.testing.assert_array_equal(upper, [self.HIGH])
-            np.testing.assert_array_equal(depth, [0])
-
-    def test_leaves_fill_the_world_and_hold_few(self):
-        centre = self.centres(500)
-        lower, upper, depth = self.leaves(centre, 6, 12)
-        assert (upper - lower).prod(axis=1).sum() == pytest.approx((self.HIGH - self.LOW).prod(), rel=1e-12)
-        inside = (lower[:, None] <= centre) & (centre < upper[:, None])
-        held = inside.all(axis=2).sum(axis=1)
-        assert held.max() <= 6
-        assert held.sum() == 500
-        assert depth.max() < 12
-        np.testing.assert_allclose(upper - lower, (self.HIGH - self.LOW) / 2.0 ** depth[:, None], rtol=1e-12)
-
-    def test_coincident_end_at_the_depth(self):
-        _, _, depth = self.leaves(np.full((30, 3), 0.3), 1, 7)
-        assert depth.max() == 7
-        assert len(depth) == 7 * 7 + 1
-
-    def test_gate(self):
-        for arguments in ((0, 5), (1, 0), (1, 21)):
-            with pytest.raises(ValueError, match="octree_leaves"):
-                self.leaves(self.centres(3), *arguments)

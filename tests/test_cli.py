@@ -63,7 +63,7 @@ def test_help_loads_nothing_heavy():
 def test_without_arguments_there_is_help():
     for result in (run(), run("--help")):
         assert "Usage: " in result.output
-        for command in ("render", "simulate", "check", "doctor", "schema"):
+        for command in ("render", "simulate", "check", "compare", "doctor", "schema"):
             assert command in result.output
 
 

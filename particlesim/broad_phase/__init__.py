@@ -16,7 +16,7 @@ the simulation calls it directly.
 
     naive   every pair                                                      no parameters
     grid    uniform cells                                                   cells=None (an int: so many along each axis)
-    octree  cells split where many particles are, a tree for each size      max_count=16, max_depth=16
+    octree  cells split where many particles are, a tree for each size      max_count=32, max_depth=16
 """
 
 from __future__ import annotations

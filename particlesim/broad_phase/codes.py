@@ -7,7 +7,10 @@ are one range.
 
 from __future__ import annotations
 
-from particlesim.broad_phase.survey import wrapped_centre
+import numpy as np
+
+from particlesim.broad_phase.survey import Survey, wrapped_centre
+from particlesim.crew import Crew
 from particlesim.jit import kernel
 
 # Levels of octants in a code, three bits each; three bits for the size class stand above them.
@@ -43,30 +46,43 @@ def octants(x, y, z):
 
 
 @kernel
-def size_class(width, widest):
+def _size_class(width, widest):
     """0 for the largest boxes, 7 for all that are at most 4**-7 of the widest."""
     found = 0
     bound = widest / CLASS_RATIO
-    while width <= bound and found < _LAST_CLASS:
-        found += 1
+    for _ in range(_LAST_CLASS):
+        found += int(width <= bound)
         bound /= CLASS_RATIO
     return found
 
 
 @kernel
-def fill_codes(first, last, lower, upper, period, origin, inverse, widest, codes, order):
+def _fill_codes(first, last, lower, upper, period, origin, inverse, widest, codes):
     """Codes of boxes ``first .. last`` in a root cube at ``origin`` (3,) [m] of edge 1 / ``inverse`` [m]."""
+    period_x, period_y, period_z = period[0], period[1], period[2]
+    origin_x, origin_y, origin_z = origin[0], origin[1], origin[2]
     for index in range(first, last):
-        width = 0.0
-        for axis in range(3):
-            width = max(width, upper[index, axis] - lower[index, axis])
+        a, b, c = lower[index, 0], lower[index, 1], lower[index, 2]
+        d, e, f = upper[index, 0], upper[index, 1], upper[index, 2]
         code = octants(
-            (wrapped_centre(lower[index, 0], upper[index, 0], period[0]) - origin[0]) * inverse,
-            (wrapped_centre(lower[index, 1], upper[index, 1], period[1]) - origin[1]) * inverse,
-            (wrapped_centre(lower[index, 2], upper[index, 2], period[2]) - origin[2]) * inverse,
+            (wrapped_centre(a, d, period_x) - origin_x) * inverse,
+            (wrapped_centre(b, e, period_y) - origin_y) * inverse,
+            (wrapped_centre(c, f, period_z) - origin_z) * inverse,
         )
-        codes[index] = size_class(width, widest) << CLASS_SHIFT | code
-        order[index] = index
+        codes[index] = _size_class(max(d - a, e - b, f - c), widest) << CLASS_SHIFT | code
+
+
+def codes_of(
+    lower: np.ndarray, upper: np.ndarray, period: np.ndarray, seen: Survey, inverse: float, crew: Crew
+) -> np.ndarray:
+    """Codes (n,) int64 of all boxes in the cube of edge 1 / ``inverse`` [m] about the region of most centres."""
+    codes = np.empty(len(lower), dtype=np.int64)
+    origin, widest = seen.region_lower, float(seen.widest.max())
+    crew.each(
+        lambda _, first, last: _fill_codes(first, last, lower, upper, period, origin, inverse, widest, codes),
+        len(lower),
+    )
+    return codes
 
 
 @kernel

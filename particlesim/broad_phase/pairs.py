@@ -1,8 +1,10 @@
-"""What every broad phase shares: the box test, the list of found pairs, the canonical order.
+"""What every broad phase shares: the box test, and the list of the pairs that pass it.
 
-While a method searches, boxes lie in columns ``(lower x y z, upper x y z)`` of a (6, n + LANES) float64 array, in
-the order that suits the method, and ``order`` (n,) int32 gives the number of each in the caller's arrays.  A found
-pair is one int64 key, ``i << 32 | j`` with i < j.
+A method stores its boxes as rows ``(lower x y z, upper x y z)`` of an (n, 6) float64 array in the order that suits
+it, and ``order`` (n,) int32 gives the number of each in the caller's arrays.  It writes the candidates it finds, as
+two rows each, to a short list, and ``append_overlaps`` decides them all in one loop without a branch: where pairs
+are few and irregular, a branch for each costs more than the test.  A found pair is one int64 key, ``i << 32 | j``
+with i < j.
 """
 
 from __future__ import annotations
@@ -14,13 +16,8 @@ import numpy as np
 from particlesim.crew import Crew
 from particlesim.jit import kernel
 
-# Candidates are taken in portions of this many, the bits of a number; a list of pairs has room for one portion more
-# than it holds, so that a portion is stored without a check at each candidate.
-PORTION = 32
-
-# Boxes tested at once: a whole number of vectors of four or eight float64.  Boxes are stored with so many unused ones
-# at the end, for the last vector of all.
-LANES = 8
+# Candidates that are decided at a time: two lists of as many uint32, which stay in the fastest cache.
+BATCH = 2048
 
 # Blocks a search is cut into for each thread: the work in a block is uneven.
 BLOCKS_PER_THREAD = 16
@@ -29,22 +26,12 @@ BLOCKS_PER_THREAD = 16
 # Wherever a method sorts boxes by rounded numbers, it widens its reach by this.
 SLACK = 2.0**-47
 
-_LOW_HALF = 0xFFFFFFFF
-
 
 @kernel
-def box_of(boxes, index):
+def row_of(boxes, index):
     """Row ``index`` of an (n, 6) array as a tuple, which stays in registers."""
     return (
         boxes[index, 0], boxes[index, 1], boxes[index, 2], boxes[index, 3], boxes[index, 4], boxes[index, 5]
-    )  # fmt: skip
-
-
-@kernel
-def column_of(boxes, index):
-    """Column ``index`` of a (6, n) array as a tuple."""
-    return (
-        boxes[0, index], boxes[1, index], boxes[2, index], boxes[3, index], boxes[4, index], boxes[5, index]
     )  # fmt: skip
 
 
@@ -80,59 +67,28 @@ def any_wraps(period):
 
 
 @kernel
-def append_overlaps(boxes, order, index, first, last, period, wraps, keys, found):
-    """Test box ``index`` against boxes ``first .. last``, store overlaps from ``keys[found]``; the new ``found``.
+def append_overlaps(candidates, size, boxes, order, period, wraps, keys, found):
+    """Test the first ``size`` of ``candidates`` (2, BATCH), rows of ``boxes``; the new ``found`` after ``keys[found]``.
 
-    Where ``keys`` has no room for another portion, overlaps are counted and not stored: the list is whole if the
-    final ``found`` leaves room for a portion (``collect`` sees to it).
-
-    The inner loops have no branch, unsigned indices (which spare the check for negative ones) and, where nothing
-    wraps, a length that is a multiple of ``LANES``: the compiler then tests a vector of boxes at once.
+    Where ``keys`` has no room for all of them, overlaps are counted and not stored: the list is whole if the final
+    ``found`` leaves room for a batch (``collect`` sees to it).  Unsigned indices spare the check for negative ones.
     """
-    box = column_of(boxes, index)
-    number = np.int64(order[index])
-    for start in range(first, last, PORTION):
-        span = min(last - start, PORTION)
-        base = np.uint64(start)
-        bits = np.int64(0)  # bit k: the box overlaps box start + k
-        if wraps:
-            for lane in range(span):
-                other = column_of(boxes, base + np.uint64(lane))
-                bits |= np.int64(boxes_overlap(box, other, period, True)) << lane
-        else:
-            for lane in range((span + LANES - 1) & -LANES):
-                other = column_of(boxes, base + np.uint64(lane))
-                bits |= np.int64(boxes_overlap(box, other, period, False)) << lane
-            bits &= (1 << span) - 1
-        if bits:
-            if found + PORTION <= keys.size:
-                fill = np.uint64(found)
-                for lane in range(span):
-                    near = np.int64(order[base + np.uint64(lane)])
-                    keys[fill] = min(number, near) << 32 | max(number, near)  # overwritten unless the bit is set
-                    fill += np.uint64(bits >> lane & 1)
-                found = np.int64(fill)
-            else:
-                for lane in range(span):
-                    found += bits >> lane & 1
-    return found
-
-
-@kernel
-def gather_boxes(first, last, lower, upper, order, boxes):
-    """Fill columns ``first .. last`` of ``boxes`` with the boxes that ``order`` names."""
-    for place in range(first, last):
-        source = order[place]
-        for axis in range(3):
-            boxes[axis, place] = lower[source, axis]
-            boxes[axis + 3, place] = upper[source, axis]
-
-
-def gathered(lower: np.ndarray, upper: np.ndarray, order: np.ndarray, crew: Crew) -> np.ndarray:
-    """The boxes that ``order`` (n,) int32 names, as (6, n + LANES) float64."""
-    boxes = np.zeros((6, len(order) + LANES))
-    crew.each(lambda _, first, last: gather_boxes(first, last, lower, upper, order, boxes), len(order))
-    return boxes
+    fill = np.uint64(found)
+    if found + size <= keys.size:
+        for slot in range(np.uint64(size)):
+            a = np.uint64(candidates[0, slot])
+            b = np.uint64(candidates[1, slot])
+            hit = boxes_overlap(row_of(boxes, a), row_of(boxes, b), period, wraps)
+            number_a = np.int64(order[a])
+            number_b = np.int64(order[b])
+            keys[fill] = min(number_a, number_b) << 32 | max(number_a, number_b)  # overwritten unless it is a hit
+            fill += np.uint64(hit)
+    else:
+        for slot in range(size):
+            a = candidates[0, slot]
+            b = candidates[1, slot]
+            fill += np.uint64(boxes_overlap(row_of(boxes, a), row_of(boxes, b), period, wraps))
+    return np.int64(fill)
 
 
 def collect(
@@ -144,84 +100,12 @@ def collect(
     """
 
     def block(_: int, first: int, last: int) -> tuple[np.ndarray, int]:
-        keys = np.empty(expected * (last - first) // max(count, 1) + 16 * PORTION, dtype=np.int64)
+        keys = np.empty(expected * (last - first) // max(count, 1) + 2 * BATCH, dtype=np.int64)
         found, tested = search(first, last, keys)
-        if found + PORTION > keys.size:
-            keys = np.empty(found + PORTION, dtype=np.int64)
+        if found + BATCH > keys.size:
+            keys = np.empty(found + BATCH, dtype=np.int64)
             found, tested = search(first, last, keys)
         return keys[:found], tested
 
     results = crew.each(block, count, BLOCKS_PER_THREAD * crew.threads)
     return [keys for keys, _ in results], sum(tested for _, tested in results)
-
-
-@kernel
-def _count_rows(keys, first, last, ends):
-    for slot in range(keys.size):
-        row = keys[slot] >> 32
-        if first <= row < last:
-            ends[row] += 1
-
-
-@kernel
-def _fill_rows(keys, first, last, cursors, columns):
-    for slot in range(keys.size):
-        row = keys[slot] >> 32
-        if first <= row < last:
-            columns[cursors[row]] = keys[slot] & _LOW_HALF
-            cursors[row] += 1
-
-
-@kernel
-def _sort_row(columns, start, stop):
-    """Shell's sort with the gaps of Knuth (The Art of Computer Programming 3, 5.2.1); insertion for short rows."""
-    gap = 1
-    while 3 * gap + 1 < (stop - start) // 3:
-        gap = 3 * gap + 1
-    while gap > 0:
-        for slot in range(start + gap, stop):
-            value = columns[slot]
-            hole = slot
-            while hole >= start + gap and columns[hole - gap] > value:
-                columns[hole] = columns[hole - gap]
-                hole -= gap
-            columns[hole] = value
-        gap //= 3
-
-
-@kernel
-def _write_rows(first, last, ends, columns, pairs):
-    for row in range(first, last):
-        start = ends[row - 1] if row > 0 else 0
-        _sort_row(columns, start, ends[row])
-        for slot in range(start, ends[row]):
-            pairs[slot, 0] = row
-            pairs[slot, 1] = columns[slot]
-
-
-def canonical(lists: list[np.ndarray], count: int, crew: Crew) -> np.ndarray:
-    """All keys of ``lists`` as (m, 2) int64 pairs sorted by (i, j), among ``count`` boxes.
-
-    Each thread takes a range of rows i and picks its keys from all lists: counted, placed by row, rows sorted.
-    """
-    sizes = np.zeros(count, dtype=np.int64)
-    total = sum(keys.size for keys in lists)
-
-    def count_block(_: int, first: int, last: int) -> None:
-        for keys in lists:
-            _count_rows(keys, first, last, sizes)
-
-    crew.each(count_block, count)
-    # A row's cursor starts where the row starts and, the row filled, stands where it ends.
-    cursors = np.cumsum(sizes)
-    cursors -= sizes
-    columns = np.empty(total, dtype=np.int32)
-    pairs = np.empty((total, 2), dtype=np.int64)
-
-    def write_block(_: int, first: int, last: int) -> None:
-        for keys in lists:
-            _fill_rows(keys, first, last, cursors, columns)
-
-    crew.each(write_block, count)
-    crew.each(lambda _, first, last: _write_rows(first, last, cursors, columns, pairs), count)
-    return pairs

@@ -19,6 +19,9 @@ _PRIME = 2654435761
 # of the cells of all.
 _TAIL = 2
 
+# Boxes looked at before the next axis is: 24 kB of corners.
+_BLOCK = 512
+
 
 class Survey(NamedTuple):
     """Each (3,) float64 [m], and ``typical`` a float [m]."""
@@ -41,24 +44,31 @@ def wrapped_centre(lower, upper, period):
 
 @kernel
 def _extremes(first, last, lower, upper, period, result):
-    """Rows of ``result`` (4, 3): -smallest and largest centre, largest width, largest absolute coordinate."""
-    for axis in range(3):
-        low = np.inf
-        high = -np.inf
-        widest = 0.0
-        largest = 0.0
-        for index in range(first, last):
-            a = lower[index, axis]
-            b = upper[index, axis]
-            centre = wrapped_centre(a, b, period[axis])
-            low = min(low, centre)
-            high = max(high, centre)
-            widest = max(widest, b - a)
-            largest = max(largest, -a, b)
-        result[0, axis] = -low
-        result[1, axis] = high
-        result[2, axis] = widest
-        result[3, axis] = largest
+    """Rows of ``result`` (4, 3): -smallest and largest centre, largest width, largest absolute coordinate.
+
+    On a periodic axis the centres are left out.  By blocks that stay in the fastest cache while the axes take turns.
+    """
+    result[0:2] = -np.inf
+    result[2:4] = 0.0
+    for block in range(first, last, _BLOCK):
+        for axis in range(3):
+            low = -result[0, axis]
+            high = result[1, axis]
+            widest = result[2, axis]
+            largest = result[3, axis]
+            wraps = period[axis] > 0.0
+            for index in range(block, min(block + _BLOCK, last)):
+                a = lower[index, axis]
+                b = upper[index, axis]
+                centre = 0.0 if wraps else 0.5 * (a + b)
+                low = min(low, centre)
+                high = max(high, centre)
+                widest = max(widest, b - a)
+                largest = max(largest, -a, b)
+            result[0, axis] = -low
+            result[1, axis] = high
+            result[2, axis] = widest
+            result[3, axis] = largest
 
 
 @kernel

@@ -1,17 +1,109 @@
-"""The nodes of the octree over sorted codes, and the bounds of the boxes in each."""
+"""The octree: boxes sorted by code as far as it takes, the nodes over them, and the bounds of the boxes in each."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from particlesim.broad_phase.codes import CLASS_SHIFT, LEVELS
-from particlesim.broad_phase.survey import wrapped_centre
-from particlesim.crew import Crew
+from particlesim.broad_phase.codes import CLASS_SHIFT, CODE_BITS, LEVELS
+from particlesim.broad_phase.columns import LANES
+from particlesim.broad_phase.counting import counting_sort
+from particlesim.broad_phase.survey import Survey, wrapped_centre
+from particlesim.crew import ALONE, Crew
 from particlesim.jit import kernel
 
 # Columns of ``nodes`` (k, 4) int32: the range of boxes, the first child (the others follow it), how many; a leaf
 # has none.  Node 0 is the root; children stand after their parents.
 START, STOP, CHILD, CHILDREN = 0, 1, 2, 3
+
+# Levels that many boxes are sorted by first, all threads together, and the size classes with them: 2**12 ranges,
+# which are then sorted further one by one.
+_TOP_LEVELS = 3
+
+# Levels sorted by at a time within a range: 2**9 counters at most.
+_LEVELS_AT_ONCE = 3
+
+# Ranges that wait to be sorted further: at most 2**9 at each step down.
+_STACK = (2 + LEVELS) * 512
+
+
+@kernel
+def _sort_range(start, stop, shift, bits, codes, order, spare_codes, spare_order, ends):
+    """Sort ``start .. stop`` by the ``bits`` above ``shift``; ``ends`` (2**bits,): where each bucket ends."""
+    mask = (1 << bits) - 1
+    ends[: mask + 1] = 0
+    for slot in range(start, stop):
+        ends[np.uint64((codes[slot] >> shift) & mask)] += 1
+    place = start
+    for bucket in range(mask + 1):
+        size = ends[bucket]
+        ends[bucket] = place
+        place += size
+    for slot in range(start, stop):
+        digit = np.uint64((codes[slot] >> shift) & mask)
+        spot = np.uint64(ends[digit])
+        ends[digit] = spot + np.uint64(1)
+        spare_codes[spot] = codes[slot]
+        spare_order[spot] = order[slot]
+    for slot in range(start, stop):
+        codes[slot] = spare_codes[slot]
+        order[slot] = spare_order[slot]
+
+
+@kernel
+def _sort_deeper(first, last, shift, lowest, max_count, starts, codes, order, spare_codes, spare_order):
+    """Sort ranges ``first .. last`` of ``starts``, equal above ``shift``, until they are short or equal to ``lowest``.
+
+    Ranges that hold at most ``max_count`` boxes stay as they are: they will not be split.
+    """
+    stack = np.empty((_STACK, 3), dtype=np.int64)
+    ends = np.empty(1 << 3 * _LEVELS_AT_ONCE, dtype=np.int64)
+    for number in range(first, last):
+        stack[0, 0] = starts[number]
+        stack[0, 1] = starts[number + 1]
+        stack[0, 2] = shift
+        size = 1
+        while size > 0:
+            size -= 1
+            start = stack[size, 0]
+            stop = stack[size, 1]
+            above = stack[size, 2]
+            if stop - start > max_count and above > lowest:
+                bits = 3
+                while bits < 3 * _LEVELS_AT_ONCE and (max_count << bits) < stop - start and bits + 3 <= above - lowest:
+                    bits += 3
+                _sort_range(start, stop, above - bits, bits, codes, order, spare_codes, spare_order, ends)
+                for bucket in range(1 << bits):
+                    if ends[bucket] - start > max_count:
+                        stack[size, 0] = start
+                        stack[size, 1] = ends[bucket]
+                        stack[size, 2] = above - bits
+                        size += 1
+                    start = ends[bucket]
+
+
+def sort_by_code(
+    codes: np.ndarray, order: np.ndarray, max_count: int, max_depth: int, crew: Crew
+) -> tuple[np.ndarray, np.ndarray]:
+    """Sort ``codes`` (n,) int64 with ``order`` (n,) int32, as far as nodes of ``max_count`` boxes need it.
+
+    Boxes are in the order of the octants of all nodes that hold more; in nodes that hold fewer they are as they were.
+    """
+    count = len(codes)
+    lowest = 3 * (LEVELS - max_depth)
+    shift = CODE_BITS
+    starts = np.array([0, count], dtype=np.int32)
+    if count >= ALONE and max_depth > _TOP_LEVELS:
+        shift = CLASS_SHIFT - 3 * _TOP_LEVELS
+        spare_codes, spare_order = codes, order
+        codes, order, starts = counting_sort(codes, order, 1 << (CODE_BITS - shift), crew, shift=shift)
+    else:
+        spare_codes, spare_order = np.empty_like(codes), np.empty_like(order)
+
+    def deeper(_: int, first: int, last: int) -> None:
+        _sort_deeper(first, last, shift, lowest, max_count, starts, codes, order, spare_codes, spare_order)
+
+    crew.each(deeper, len(starts) - 1, 32 * crew.threads)
+    return codes, order
 
 
 @kernel
@@ -59,7 +151,12 @@ def _build(codes, max_count, max_depth, nodes):
             if shift >= 0:
                 nodes[node, CHILD] = size
                 while start < stop:
-                    end = _end_of_digit(codes, start, stop, shift)
+                    # Octants that hold few together are one leaf: half of the node, or a quarter, or an eighth.
+                    bits = 0 if shift == CLASS_SHIFT else 2
+                    end = _end_of_digit(codes, start, stop, shift + bits)
+                    while bits > 0 and end - start > max_count:
+                        bits -= 1
+                        end = _end_of_digit(codes, start, end, shift + bits)
                     nodes[size, START] = start
                     nodes[size, STOP] = end
                     size += 1
@@ -67,42 +164,6 @@ def _build(codes, max_count, max_depth, nodes):
                 nodes[node, CHILDREN] = size - nodes[node, CHILD]
         node += 1
     return size
-
-
-@kernel
-def _fit_leaves(first, last, nodes, boxes, period, slack, bounds):
-    for node in range(first, last):
-        if nodes[node, CHILDREN] == 0:
-            for axis in range(3):
-                low = np.inf
-                high = -np.inf
-                for index in range(nodes[node, START], nodes[node, STOP]):
-                    a = boxes[axis, index]
-                    b = boxes[axis + 3, index]
-                    if period[axis] > 0.0:
-                        # The image whose centre is in the primary cell; its rounding is in the slack.
-                        shift = wrapped_centre(a, b, period[axis]) - 0.5 * (a + b)
-                        a += shift - slack[axis]
-                        b += shift + slack[axis]
-                    low = min(low, a)
-                    high = max(high, b)
-                bounds[node, axis] = low
-                bounds[node, axis + 3] = high
-
-
-@kernel
-def _fit_parents(nodes, bounds):
-    """From the last node to the root: children stand after their parents."""
-    for node in range(nodes.shape[0] - 1, -1, -1):
-        child = nodes[node, CHILD]
-        for near in range(child, child + nodes[node, CHILDREN]):
-            for axis in range(3):
-                if near == child:
-                    bounds[node, axis] = bounds[near, axis]
-                    bounds[node, axis + 3] = bounds[near, axis + 3]
-                else:
-                    bounds[node, axis] = min(bounds[node, axis], bounds[near, axis])
-                    bounds[node, axis + 3] = max(bounds[node, axis + 3], bounds[near, axis + 3])
 
 
 def build(codes: np.ndarray, max_count: int, max_depth: int) -> np.ndarray:
@@ -115,9 +176,82 @@ def build(codes: np.ndarray, max_count: int, max_depth: int) -> np.ndarray:
     return nodes[: _build(codes, max_count, max_depth, nodes)]
 
 
-def fit(nodes: np.ndarray, boxes: np.ndarray, period: np.ndarray, slack: np.ndarray, crew: Crew) -> np.ndarray:
-    """Bounds (k, 6) float64 of the boxes in each node; on a periodic axis of their images in the primary cell."""
-    bounds = np.empty((len(nodes), 6))
-    crew.each(lambda _, first, last: _fit_leaves(first, last, nodes, boxes, period, slack, bounds), len(nodes))
+@kernel
+def _fill_in_order(first, last, lower, upper, order, period, origin, scale, boxes, columns):
+    for place in range(first, last):
+        index = np.uint64(order[place])
+        for axis in range(3):
+            a = lower[index, axis]
+            b = upper[index, axis]
+            boxes[place, axis] = a
+            boxes[place, axis + 3] = b
+            if period[axis] > 0.0:
+                shift = wrapped_centre(a, b, period[axis]) - 0.5 * (a + b)
+                a += shift
+                b += shift
+            columns[axis, place] = (a - origin[axis]) * scale
+            columns[axis + 3, place] = (b - origin[axis]) * scale
+
+
+def in_order(
+    lower: np.ndarray,
+    upper: np.ndarray,
+    order: np.ndarray,
+    period: np.ndarray,
+    seen: Survey,
+    scale: float,
+    crew: Crew,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The boxes that ``order`` (n,) names: rows (n, 6) float64 [m], and columns (6, n + LANES) float32.
+
+    Columns are about the corner of the region and times ``scale``; on a periodic axis they hold the image whose
+    centre is in the primary cell.
+    """
+    count = len(order)
+    boxes, columns = np.empty((count, 6)), np.zeros((6, count + LANES), dtype=np.float32)
+    origin = seen.region_lower
+    crew.each(
+        lambda _, first, last: _fill_in_order(first, last, lower, upper, order, period, origin, scale, boxes, columns),
+        count,
+    )
+    return boxes, columns
+
+
+@kernel
+def _fit_leaves(first, last, nodes, columns, bounds):
+    for node in range(first, last):
+        if nodes[node, CHILDREN] == 0:
+            start = np.uint64(nodes[node, START])
+            stop = np.uint64(nodes[node, STOP])
+            for axis in range(3):
+                low = columns[axis, start]
+                high = columns[axis + 3, start]
+                for place in range(start + np.uint64(1), stop):
+                    low = min(low, columns[axis, place])
+                    high = max(high, columns[axis + 3, place])
+                bounds[axis, node] = low
+                bounds[axis + 3, node] = high
+
+
+@kernel
+def _fit_parents(nodes, bounds):
+    """From the last node to the root: children stand after their parents."""
+    for node in range(nodes.shape[0] - 1, -1, -1):
+        child = nodes[node, CHILD]
+        if nodes[node, CHILDREN] > 0:
+            for axis in range(3):
+                low = bounds[axis, child]
+                high = bounds[axis + 3, child]
+                for near in range(child + 1, child + nodes[node, CHILDREN]):
+                    low = min(low, bounds[axis, near])
+                    high = max(high, bounds[axis + 3, near])
+                bounds[axis, node] = low
+                bounds[axis + 3, node] = high
+
+
+def fit(nodes: np.ndarray, columns: np.ndarray, crew: Crew) -> np.ndarray:
+    """Bounds (6, k + LANES) float32 of the columns in each node."""
+    bounds = np.zeros((6, len(nodes) + LANES), dtype=np.float32)
+    crew.each(lambda _, first, last: _fit_leaves(first, last, nodes, columns, bounds), len(nodes), 4 * crew.threads)
     _fit_parents(nodes, bounds)
     return bounds

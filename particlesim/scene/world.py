@@ -62,7 +62,7 @@ class Octree(Model):
     """Nodes split while they hold more than ``max_count`` particles, down to ``max_depth``."""
 
     kind: Literal["octree"]
-    max_count: Annotated[int, Field(ge=1, le=1_000_000), whole, must_be("a whole number from 1 to 1,000,000")] = 16
+    max_count: Annotated[int, Field(ge=1, le=1_000_000), whole, must_be("a whole number from 1 to 1,000,000")] = 32
     max_depth: Annotated[int, Field(ge=1, le=20), whole, must_be("a whole number from 1 to 20")] = 16
 
 
