@@ -39,10 +39,25 @@ def _at_least_one(threads: int | None) -> int | None:
     return threads
 
 
+def _not_negative(drift: float | None) -> float | None:
+    if drift is not None and not drift >= 0.0:
+        raise typer.BadParameter("must be a number of 0 or more")
+    return drift
+
+
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Threads = Annotated[
     int | None, typer.Option("--threads", callback=_at_least_one, help="Threads to simulate with.  [default: all]")
+]
+MaxDrift = Annotated[
+    float | None,
+    typer.Option(
+        "--max-drift",
+        metavar="X",
+        callback=_not_negative,
+        help="End with exit code 3 if the energy drifts by more than this fraction of it; the output is kept.",
+    ),
 ]
 Version = Annotated[
     bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
@@ -50,7 +65,11 @@ Version = Annotated[
 
 
 def main() -> None:
-    """Run the command line. Exit code 2 for wrong input, 1 for what this machine cannot do, 130 for Ctrl-C."""
+    """Run the command line.
+
+    Exit code 2 for wrong input, 1 for what this machine cannot do, 3 for a drift of energy that was not allowed,
+    130 for Ctrl-C.
+    """
     app()
 
 
@@ -131,6 +150,15 @@ def _check_output(path: Path, suffix: str) -> None:
         _fail(f"{path}: the folder {path.parent} cannot be written to", 1)
 
 
+def _check_drift(summary: Summary, path: Path, allowed: float | None) -> None:
+    """Exit with a line if more energy came or went than is allowed. The output stays: it shows what went wrong."""
+    drift = summary.forbidden_energy_drift
+    # The other way round a drift that is not a number would pass.
+    if allowed is not None and not drift <= allowed:
+        way = "drifted" if summary.elastic else "rose"
+        _fail(f"{path}: written, but its energy {way} by {drift:.1e} of all of it, more than {allowed:g}", 3)
+
+
 def _load(source: Path) -> Scene:
     """The scene of a file. SceneError if it is wrong."""
     from particlesim.scene.file import SceneError, load_scene  # noqa: PLC0415
@@ -148,6 +176,7 @@ def render(
     ] = None,
     quiet: Quiet = False,
     threads: Threads = None,
+    max_drift: MaxDrift = None,
 ) -> None:
     """Simulate a scene, or read a trajectory, and make a movie of it, with a poster (PNG) beside it."""
     with _one_line_errors(source):
@@ -161,6 +190,7 @@ def render(
                 summary = make_movie(movable, path, progress=progress, threads=threads)
             if not quiet:
                 _print_summary(summary, path)
+            _check_drift(summary, path, max_drift)
 
 
 @app.command(short_help="Simulate a scene and write its trajectory.")
@@ -171,6 +201,7 @@ def simulate(
     ] = None,
     quiet: Quiet = False,
     threads: Threads = None,
+    max_drift: MaxDrift = None,
 ) -> None:
     """Simulate a scene and write its trajectory (GSD): no OpenGL, no movie."""
     with _one_line_errors(scene):
@@ -184,6 +215,7 @@ def simulate(
                 summary = write_trajectory(loaded, path, progress=progress, threads=threads)
             if not quiet:
                 _print_summary(summary, path)
+            _check_drift(summary, path, max_drift)
 
 
 @app.command(short_help="Validate a scene and say what it amounts to.")
