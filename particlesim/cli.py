@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from particlesim.bench import Speed
     from particlesim.scene import Scene
     from particlesim.summary import Summary
 
@@ -228,6 +229,33 @@ def check(scene: SceneArgument) -> None:
         _print_table(scene.name, survey(loaded))
 
 
+@app.command(short_help="Measure how fast this machine simulates.")
+def bench(
+    large: Annotated[bool, typer.Option("--large", help="Measure a million particles as well.")] = False,
+    figures: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write the figures to a file as well.")
+    ] = None,
+    quiet: Quiet = False,
+    threads: Threads = None,
+) -> None:
+    """Measure how many whole time steps a second gases of spheres and of mixed shapes make on this machine.
+
+    They are in a periodic box at unit temperature. In a step a particle moves a twentieth of its radius on average.
+    """
+    with _one_line_errors(Path("bench")):
+        if figures is not None:
+            _check_output(figures, ".json")
+        from particlesim.bench import COUNTS, LARGE, run, write  # noqa: PLC0415
+        from particlesim.progress import shown_progress  # noqa: PLC0415
+
+        with shown_progress(quiet, "measurement") as progress:
+            speeds = list(run((*COUNTS, LARGE) if large else COUNTS, threads, progress))
+        if figures is not None:
+            write(figures, speeds)
+        if not quiet:
+            _print_speeds(speeds)
+
+
 @app.command(short_help="Say what this machine has and what is missing.")
 def doctor() -> None:
     """Say what this machine has for simulating and drawing, and how to get what is missing."""
@@ -261,6 +289,39 @@ def _print_table(title: str, rows: list[tuple[str, Any]]) -> None:
         # As Text: square brackets in names of groups and files are no markup.
         table.add_row(Text(name), Text(str(value)))
     Console().print(table)
+
+
+def _print_speeds(speeds: list[Speed]) -> None:
+    from rich.console import Console  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+
+    from particlesim.crew import available_threads  # noqa: PLC0415
+
+    title = f"Whole steps, {available_threads()} threads"
+    # Ten columns in the 80 letters of a plain terminal: no frame.
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("gas", no_wrap=True)
+    phases = list(speeds[0].milliseconds)
+    for name in ("particles", "M/s", "spread", *phases, "impacts", "bytes"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for speed in speeds:
+        table.add_row(
+            speed.gas,
+            f"{speed.particles:,}",
+            f"{speed.rate:.2f}",
+            f"{speed.spread:.0%}",
+            *(f"{speed.milliseconds[phase]:.3g}" for phase in phases),
+            f"{speed.impacts:.3f}",
+            "" if speed.bytes is None else f"{speed.bytes:,.0f}",
+        )
+    console = Console()
+    console.print(table)
+    for line in (
+        "M/s: million particle-steps a second, median; spread: from the least to the most",
+        f"{', '.join(phases)}: milliseconds a step",
+        "impacts: a particle and step; bytes: a particle, at the most",
+    ):
+        console.print(line, style="dim", highlight=False)
 
 
 def _print_summary(summary: Summary, path: Path) -> None:

@@ -42,9 +42,10 @@ def _words(seconds: float) -> str:
 
 
 class _Lines:
-    """Plain lines to standard error: what is going on, frame k of n, time left."""
+    """Plain lines to standard error: what is going on, ``unit`` k of n, time left."""
 
-    def __init__(self) -> None:
+    def __init__(self, unit: str) -> None:
+        self._unit = unit
         self._phase = ""
         self._last = time.monotonic()
         self._pace = _Pace()
@@ -55,7 +56,7 @@ class _Lines:
         if phase == self._phase and now - self._last < _INTERVAL and done < total:
             return
         self._phase, self._last = phase, now
-        counted = f": frame {done} of {total}" if done else f" {total} frames"
+        counted = f": {self._unit} {done} of {total}" if done else f" {total} {self._unit}s"
         ending = f", {_words(left)}" if left is not None and done < total else ""
         print(f"{phase}{counted}{ending}", file=sys.stderr, flush=True)
 
@@ -72,13 +73,14 @@ class _TimeLeft(ProgressColumn):
 class _Bar:
     """A bar with the same on a terminal."""
 
-    def __init__(self, bar: Progress) -> None:
+    def __init__(self, bar: Progress, unit: str) -> None:
         self._bar = bar
+        self._unit = unit
         self._task = bar.add_task("starting", total=None)
         self._pace = _Pace()
 
     def __call__(self, phase: str, done: int, total: int) -> None:
-        counted = f"frame {done} of {total}" if done else f"{total} frames"
+        counted = f"{self._unit} {done} of {total}" if done else f"{total} {self._unit}s"
         self._bar.update(
             self._task,
             completed=done,
@@ -89,14 +91,14 @@ class _Bar:
 
 
 @contextmanager
-def shown_progress(quiet: bool) -> Iterator[_Lines | _Bar | None]:
-    """A progress callback for ``simulate`` and ``render``, fit for where standard error goes; None if ``quiet``."""
+def shown_progress(quiet: bool, unit: str = "frame") -> Iterator[_Lines | _Bar | None]:
+    """A progress callback that counts ``unit`` after unit, fit for where standard error goes; None if ``quiet``."""
     console = Console(stderr=True)
     if quiet:
         yield None
     elif console.is_terminal:
         columns = TextColumn("{task.description}"), BarColumn(), _TimeLeft()
         with Progress(*columns, console=console, transient=True) as bar:
-            yield _Bar(bar)
+            yield _Bar(bar, unit)
     else:
-        yield _Lines()
+        yield _Lines(unit)

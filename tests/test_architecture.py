@@ -17,7 +17,7 @@ FLOORS = [
     ["trajectory", "ledger", "scene"],
     ["insertion", "placement", "launch", "build"],
     ["simulation", "rendering"],
-    ["summary", "pipeline", "progress", "survey", "diagnosis", "cli", "__main__", "__init__"],
+    ["summary", "pipeline", "progress", "survey", "diagnosis", "bench", "cli", "__main__", "__init__"],
 ]
 FLOOR = {name: level for level, names in enumerate(FLOORS) for name in names}
 SOURCES = sorted(PACKAGE.rglob("*.py"))
