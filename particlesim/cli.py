@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from particlesim.bench import Speed
     from particlesim.compare.command import Report
     from particlesim.scene import Scene
     from particlesim.summary import Summary
@@ -40,10 +41,25 @@ def _at_least_one(threads: int | None) -> int | None:
     return threads
 
 
+def _not_negative(drift: float | None) -> float | None:
+    if drift is not None and not drift >= 0.0:
+        raise typer.BadParameter("must be a number of 0 or more")
+    return drift
+
+
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Threads = Annotated[
     int | None, typer.Option("--threads", callback=_at_least_one, help="Threads to simulate with.  [default: all]")
+]
+MaxDrift = Annotated[
+    float | None,
+    typer.Option(
+        "--max-drift",
+        metavar="X",
+        callback=_not_negative,
+        help="End with exit code 3 if the energy drifts by more than this fraction of it; the output is kept.",
+    ),
 ]
 Version = Annotated[
     bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
@@ -51,7 +67,11 @@ Version = Annotated[
 
 
 def main() -> None:
-    """Run the command line. Exit code 2 for wrong input, 1 for what this machine cannot do, 130 for Ctrl-C."""
+    """Run the command line.
+
+    Exit code 2 for wrong input, 1 for what this machine cannot do, 3 for a drift of energy that was not allowed,
+    130 for Ctrl-C.
+    """
     app()
 
 
@@ -132,6 +152,15 @@ def _check_output(path: Path, suffix: str) -> None:
         _fail(f"{path}: the folder {path.parent} cannot be written to", 1)
 
 
+def _check_drift(summary: Summary, path: Path, allowed: float | None) -> None:
+    """Exit with a line if more energy came or went than is allowed. The output stays: it shows what went wrong."""
+    drift = summary.forbidden_energy_drift
+    # The other way round a drift that is not a number would pass.
+    if allowed is not None and not drift <= allowed:
+        way = "drifted" if summary.elastic else "rose"
+        _fail(f"{path}: written, but its energy {way} by {drift:.1e} of all of it, more than {allowed:g}", 3)
+
+
 def _load(source: Path) -> Scene:
     """The scene of a file. SceneError if it is wrong."""
     from particlesim.scene.file import SceneError, load_scene  # noqa: PLC0415
@@ -149,6 +178,7 @@ def render(
     ] = None,
     quiet: Quiet = False,
     threads: Threads = None,
+    max_drift: MaxDrift = None,
 ) -> None:
     """Simulate a scene, or read a trajectory, and make a movie of it, with a poster (PNG) beside it."""
     with _one_line_errors(source):
@@ -162,6 +192,7 @@ def render(
                 summary = make_movie(movable, path, progress=progress, threads=threads)
             if not quiet:
                 _print_summary(summary, path)
+            _check_drift(summary, path, max_drift)
 
 
 @app.command(short_help="Simulate a scene and write its trajectory.")
@@ -172,6 +203,7 @@ def simulate(
     ] = None,
     quiet: Quiet = False,
     threads: Threads = None,
+    max_drift: MaxDrift = None,
 ) -> None:
     """Simulate a scene and write its trajectory (GSD): no OpenGL, no movie."""
     with _one_line_errors(scene):
@@ -185,6 +217,7 @@ def simulate(
                 summary = write_trajectory(loaded, path, progress=progress, threads=threads)
             if not quiet:
                 _print_summary(summary, path)
+            _check_drift(summary, path, max_drift)
 
 
 @app.command(short_help="Validate a scene and say what it amounts to.")
@@ -246,6 +279,33 @@ def compare(
         _fail("the broad phases do not agree", 1)
 
 
+@app.command(short_help="Measure how fast this machine simulates.")
+def bench(
+    large: Annotated[bool, typer.Option("--large", help="Measure a million particles as well.")] = False,
+    figures: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write the figures to a file as well.")
+    ] = None,
+    quiet: Quiet = False,
+    threads: Threads = None,
+) -> None:
+    """Measure how many whole time steps a second gases of spheres and of mixed shapes make on this machine.
+
+    They are in a periodic box at unit temperature. In a step a particle moves a twentieth of its radius on average.
+    """
+    with _one_line_errors(Path("bench")):
+        if figures is not None:
+            _check_output(figures, ".json")
+        from particlesim.bench import COUNTS, LARGE, run, write  # noqa: PLC0415
+        from particlesim.progress import shown_progress  # noqa: PLC0415
+
+        with shown_progress(quiet, "measurement") as progress:
+            speeds = list(run((*COUNTS, LARGE) if large else COUNTS, threads, progress))
+        if figures is not None:
+            write(figures, speeds)
+        if not quiet:
+            _print_speeds(speeds)
+
+
 @app.command(short_help="Say what this machine has and what is missing.")
 def doctor() -> None:
     """Say what this machine has for simulating and drawing, and how to get what is missing."""
@@ -286,6 +346,39 @@ def _print_report(report: Report) -> None:
 
     Console().print(report.table)
     print("\n".join(str(path) for path in report.written))
+
+
+def _print_speeds(speeds: list[Speed]) -> None:
+    from rich.console import Console  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+
+    from particlesim.crew import available_threads  # noqa: PLC0415
+
+    title = f"Whole steps, {available_threads()} threads"
+    # Ten columns in the 80 letters of a plain terminal: no frame.
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("gas", no_wrap=True)
+    phases = list(speeds[0].milliseconds)
+    for name in ("particles", "M/s", "spread", *phases, "impacts", "bytes"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for speed in speeds:
+        table.add_row(
+            speed.gas,
+            f"{speed.particles:,}",
+            f"{speed.rate:.2f}",
+            f"{speed.spread:.0%}",
+            *(f"{speed.milliseconds[phase]:.3g}" for phase in phases),
+            f"{speed.impacts:.3f}",
+            "" if speed.bytes is None else f"{speed.bytes:,.0f}",
+        )
+    console = Console()
+    console.print(table)
+    for line in (
+        "M/s: million particle-steps a second, median; spread: from the least to the most",
+        f"{', '.join(phases)}: milliseconds a step",
+        "impacts: a particle and step; bytes: a particle, at the most",
+    ):
+        console.print(line, style="dim", highlight=False)
 
 
 def _print_summary(summary: Summary, path: Path) -> None:

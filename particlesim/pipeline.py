@@ -120,7 +120,9 @@ def _scene_of(trajectory: Trajectory) -> Scene:
 
 
 def _summary(scene: Scene, header: Header) -> Summary:
-    return Summary(float(header.mass.sum()), scene.world.gravity)
+    restitutions = [scene.world.restitution, *(group.restitution for group in scene.particles)]
+    elastic = all(restitution in (None, 1.0) for restitution in restitutions)
+    return Summary(float(header.mass.sum()), scene.world.gravity, elastic)
 
 
 def _tell(progress: Progress | None, phase: str, done: int, total: int) -> None:

@@ -74,8 +74,8 @@ class _Bar:
     """A bar with the same on a terminal."""
 
     def __init__(self, bar: Progress, unit: str) -> None:
-        self._unit = unit
         self._bar = bar
+        self._unit = unit
         self._task = bar.add_task("starting", total=None)
         self._pace = _Pace()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,16 @@ class Summary:
     """Gathers frames as they pass: ``add`` each, then read the attributes.
 
     Energies are compared with what there was at first, or with the largest kinetic energy seen if that is more.
+    ``elastic`` says that no impact may take energy.
     """
 
-    def __init__(self, total_mass: float, gravity: Any) -> None:
+    def __init__(self, total_mass: float, gravity: Any, elastic: bool = True) -> None:
         self._mass, self._gravity = total_mass, np.asarray(gravity, dtype=np.float64)
+        self.elastic = elastic
         self._first: Frame | None = None
         self._last: Frame | None = None
-        self._largest_kinetic = self._largest_change = 0.0
+        self._largest_kinetic = self._largest_change = self._largest_gain = 0.0
+        self._least = math.inf
         self.frames = 0
         self.largest_overlap = 0.0
         self.seconds: dict[str, float] = {}
@@ -32,7 +36,10 @@ class Summary:
         self.largest_overlap = max(self.largest_overlap, frame.ledger["largest_overlap"])
         kinetic = frame.ledger["kinetic_translational"] + frame.ledger["kinetic_rotational"]
         self._largest_kinetic = max(self._largest_kinetic, kinetic)
-        self._largest_change = max(self._largest_change, abs(_energy(frame) - _energy(self._first)))
+        energy = _energy(frame)
+        self._largest_change = max(self._largest_change, abs(energy - _energy(self._first)))
+        self._least = min(self._least, energy)
+        self._largest_gain = max(self._largest_gain, energy - self._least)
 
     @property
     def simulated_seconds(self) -> float:
@@ -52,8 +59,19 @@ class Summary:
     @property
     def worst_energy_drift(self) -> float:
         """Largest change of the total energy since the first frame, as a fraction of it."""
+        return self._of_all(self._largest_change)
+
+    @property
+    def forbidden_energy_drift(self) -> float:
+        """What of the change of energy should not be, as a fraction of all: if not ``elastic``, only what came back.
+
+        That is the largest rise above the least energy of the frames before.
+        """
+        return self._of_all(self._largest_change if self.elastic else self._largest_gain)
+
+    def _of_all(self, energy: float) -> float:
         scale = max(self._largest_kinetic, _energy(self._first) if self._first else 0.0)
-        return self._largest_change / scale if scale else 0.0
+        return energy / scale if scale else 0.0
 
     @property
     def momentum_error(self) -> float:

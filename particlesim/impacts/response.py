@@ -43,7 +43,7 @@ def _inverse_mass_at(constants, state, i, arm, normal):
     """
     twist = cross(arm, normal)
     spin = spin_of(row4(state.orientation, i), twist, row(constants.inertia, i))
-    return 1.0 / constants.mass[i] + dot(twist, spin)
+    return dot(normal, normal) / constants.mass[i] + dot(twist, spin)
 
 
 @kernel

@@ -86,8 +86,16 @@ def spheres_near(offset, velocity, reach, duration):
 @kernel
 def _fastest_corner(body, path):
     """The largest speed of a point of a body by its rotation [m/s]."""
+    return body[2] * _fastest_spin(body, path)
+
+
+@kernel
+def _fastest_spin(body, path):
+    """The largest angular speed of a free body [rad/s]: it keeps its angular momentum and its energy."""
     a, b, c = body[3]
-    return body[2] * norm(path[3]) / min(a, b, c)
+    least = min(a, b, c)
+    twice = dot(path[3], spin_of(path[1], path[3], body[3]))
+    return min(norm(path[3]) / least, math.sqrt(twice / least))
 
 
 @kernel
@@ -119,9 +127,16 @@ def _bend(kind, body, path):
     bend = 0.0
     if kind != SPHERE:
         a, b, c = body[3]
-        least, most = min(a, b, c), max(a, b, c)
-        fastest = norm(path[3]) / least
-        bend = body[2] * fastest * fastest * (1.0 + (most - least) / (2.0 * least))
+        whole = norm(path[3])
+        twice = dot(path[3], spin_of(path[1], path[3], body[3]))
+        x, y, z = (
+            min(whole / a, math.sqrt(twice / a)),
+            min(whole / b, math.sqrt(twice / b)),
+            min(whole / c, math.sqrt(twice / c)),
+        )
+        change = norm((abs(b - c) / a * y * z, abs(c - a) / b * z * x, abs(a - b) / c * x * y))
+        fastest = min(_fastest_spin(body, path), norm((x, y, z)))
+        bend = body[2] * (fastest * fastest + change)
     return bend
 
 
