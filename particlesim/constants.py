@@ -38,15 +38,16 @@ RESTING_TILT = 1e-2
 # What rebounds in full rests only if it is this much slower and nearer than what does not: energy is kept to 1e-14.
 STILL = 1e-6
 
-# Impacts that hang together within one stretch of time, for each of their particles, before what still approaches is
-# left to the next one and counted.
+# Impacts that hang together within one stretch of time, for each of their particles, before it is cut shorter.
 MAX_IMPACTS = 1000
 
 # The same for impacts of what comes to rest: the next stretch begins with all their contacts at once.
 MAX_SLOW_IMPACTS = 100
 
-# Times that islands are joined within one stretch of time before it is tried in two halves.
+# Times that islands are joined within one stretch of time before it is tried in two halves, and how often it is
+# halved before it is taken as it is: islands with more impacts than that then stand still until its end.
 MAX_ROUNDS = 40
+MAX_HALVINGS = 5
 
 # Impacts of the same particles that are apart by less than this fraction of a stretch of time happen at once: some
 # digits above the rounding of times, and the way made meanwhile is less than 1e-10 of a size.

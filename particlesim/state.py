@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from particlesim.constants import SINKING
 from particlesim.shapes import Shape
 
 
@@ -65,8 +66,8 @@ class World(NamedTuple):
     period: np.ndarray  # (3,) edge of a periodic axis [m], 0 elsewhere
     gravity: np.ndarray  # (3,) [m/s^2]
     restitution: float  # of the walls
-    still: float  # speed below which nothing counts as approaching [m/s]
-    sinking: float  # how deep touches may go before they count again, as a fraction of sizes
+    still: float = 0.0  # speed below which nothing counts as approaching [m/s]
+    sinking: float = SINKING  # how deep touches may go before they count again, as a fraction of sizes
 
 
 class ShapeTable(NamedTuple):

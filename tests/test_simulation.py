@@ -105,7 +105,9 @@ def test_the_ledger_counts():
     sim.run(steps=10)
     ledger = sim.ledger
     assert ledger.steps == 10
-    assert ledger.pairs_tested == 11 * (40 * 39 // 2)
+    # Neighbours are looked up when somebody has gone far, not in every step.
+    assert ledger.pairs_tested % (40 * 39 // 2) == 0
+    assert 0 < ledger.pairs_tested <= 11 * (40 * 39 // 2)
     assert 0 < ledger.candidate_pairs < ledger.pairs_tested
     mass, velocity = sim.particles.mass[:, None], sim.particles.velocity
     assert ledger.kinetic_translational == pytest.approx(0.5 * (mass * velocity**2).sum(), rel=1e-12)

@@ -151,6 +151,28 @@ def _begin(met, times, first_met, stamp, members, heap):
 
 
 @kernel
+def _halt(state, course, constants, members, time, duration, piece, particle, pieces):
+    """Let the members stand where they are at ``time`` until the end of the stretch; returns how many pieces there are.
+
+    They keep their velocities, but nothing can get into anything else.
+    """
+    for i in members:
+        if course.head[i] == NOTHING_MET:
+            write_piece(piece, pieces, 0.0, state, course.acceleration, i)
+            particle[pieces, 0] = i
+            pieces += 1
+            course.head[i] = UNCHAINED
+        _bring(state, course, constants, i, time)
+        course.clock[i] = duration
+        write_piece(piece, pieces, time, state, course.acceleration, i)
+        for column in range(8, PIECE):
+            piece[pieces, column] = 0.0
+        particle[pieces, 0] = i
+        pieces += 1
+    return pieces
+
+
+@kernel
 def run_islands(
     table,
     world,
@@ -187,6 +209,7 @@ def run_islands(
         heap.clear()
         members = member[edges[k] : edges[k + 1]]
         _begin(met, times, first_met, stamp, members, heap)
+        time = 0.0
         left, slow_left = MAX_IMPACTS * len(members), MAX_SLOW_IMPACTS * len(members)
         while left > 0:
             time, count, size = _moment(heap, stamp, SIMULTANEOUS * duration, contacts, whom)
@@ -233,5 +256,9 @@ def run_islands(
                 _foretell(
                     table, world, constants, state, course, start, other, whom, m, soonest, duration, heap, points
                 )
-        unfinished += left == 0
+        if left == 0:
+            unfinished += 1
+            while pieces + 2 * len(members) > len(piece):
+                piece, particle = grown(piece), grown(particle)
+            pieces = _halt(state, course, constants, members, time, duration, piece, particle, pieces)
     return piece[:pieces], particle[:pieces, 0], unfinished

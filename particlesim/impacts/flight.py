@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from particlesim.constants import LONGEST_STRETCH, MAX_ROUNDS
+from particlesim.constants import LONGEST_STRETCH, MAX_HALVINGS, MAX_ROUNDS
 from particlesim.crew import Crew
 from particlesim.impacts.course import Log, empty_log, extended, forget, new_course, rewind
 from particlesim.impacts.event_loop import run_islands
@@ -76,8 +76,8 @@ class Flight:
     def longest_stretch(self, fraction: float) -> float:
         """In how long [s] the surfaces move by ``fraction`` of the bounding radius on average; inf if never.
 
-        The surface of a particle moves at most (|v| + |w| R) t + g t^2 / 2. On periodic axes nothing goes farther
-        than an eighth of the way round, so that it is clear which image of another it meets.
+        The surface of a particle moves at most (|v| + |w| R) t + g t^2 / 2. On periodic axes nothing goes so
+        far that it could meet another image of a particle than the nearest.
         """
         count = len(self._constants.mass)
         if not count:
@@ -89,8 +89,11 @@ class Flight:
         time = min(time, self._resting.longest_stretch)
         around = self._world.period[self._world.period > 0.0]
         if len(around):
+            # A quarter of the room to the next image of another, for two that close in on it at twice the speed.
+            room = 0.5 * around.min() - 2.0 * self._constants.radius.max()
+            way = max(0.25 * room, 1e-3 * self._constants.radius.min())
             gravity = float(np.linalg.norm(self._world.gravity))
-            time = min(time, _time_for(around.min() / 8.0, fastest, gravity))
+            time = min(time, _time_for(way, fastest, gravity))
         return time
 
     def advance(self, duration: float) -> None:
@@ -105,17 +108,17 @@ class Flight:
         yield
         self.seconds[phase] += time.perf_counter() - begun
 
-    def _stretch(self, duration: float) -> None:
+    def _stretch(self, duration: float, halvings: int = 0) -> None:
         if duration > self._on_leash:
             with self._spent_on("pairs"):
                 self._look_around(duration)
-        if not self._follow(duration):
-            # Too much hangs together: less does in half the time.
-            self._stretch(0.5 * duration)
-            self._stretch(0.5 * duration)
+        if not self._follow(duration, halvings == MAX_HALVINGS):
+            # Too much hangs together, or happens: less does in half the time.
+            self._stretch(0.5 * duration, halvings + 1)
+            self._stretch(0.5 * duration, halvings + 1)
 
-    def _follow(self, duration: float) -> bool:
-        """Move all on by ``duration`` [s]; False, with nothing moved, if that takes too many rounds."""
+    def _follow(self, duration: float, anyhow: bool) -> bool:
+        """Move all on by ``duration`` [s]; False, with nothing moved, if that takes too much but not ``anyhow``."""
         course, state = self._course, self._state
         log = empty_log()
         with self._spent_on("respond"):
@@ -127,7 +130,7 @@ class Flight:
         self._first_met[met[starts, 0]] = starts
         linked = met
         rounds = unfinished = 0
-        while len(linked) and rounds < MAX_ROUNDS:
+        while len(linked) and (anyhow or (rounds < MAX_ROUNDS and not unfinished)):
             with self._spent_on("respond"):
                 islands = unite(course.island, linked, touched)
                 rewind(course, log, state, islands.member)
@@ -139,7 +142,7 @@ class Flight:
                 linked = self._missed(log, first_piece, duration)
             touched = np.union1d(touched, linked.ravel())
             rounds += 1
-        done = not len(linked)
+        done = not len(linked) and (anyhow or not unfinished)
         if done:
             self._book(touched, unfinished)
             with self._spent_on("advance"):

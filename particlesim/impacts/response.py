@@ -146,16 +146,24 @@ def is_held(acceleration, i):
 
 
 @kernel
-def _bounce(world, constants, acceleration, i, j, speed):
+def _turns_slowly(constants, state, i, speed):
+    """Whether rotation moves no point of particle ``i`` faster than ``speed`` [m/s]; walls do not turn."""
+    return i < 0 or norm(particle_spin(constants, state, i)) * constants.radius[i] <= speed
+
+
+@kernel
+def _bounce(world, constants, state, acceleration, i, j, speed):
     """What comes of partners that approach at a ``speed`` [m/s], and the factor on the impulse that would stop them."""
     restitution, resting = restitution_of(world, constants, i, j)
     if restitution == 1.0 or speed > resting:
         return STRUCK, 1.0 + restitution
-    if is_held(acceleration, i) and is_held(acceleration, j):
+    held_i, held_j = is_held(acceleration, i), is_held(acceleration, j)
+    if not (held_i or held_j):
+        return REBOUNDED, 2.0
+    both = held_i and held_j
+    if both and _turns_slowly(constants, state, i, resting) and _turns_slowly(constants, state, j, resting):
         return LEFT, 0.0
-    if is_held(acceleration, i) or is_held(acceleration, j):
-        return LANDED, 1.0
-    return REBOUNDED, 2.0
+    return LANDED, 1.0
 
 
 @kernel
@@ -196,7 +204,7 @@ def answer(table, world, constants, state, acceleration, contacts, count, whom, 
                 if j >= 0:
                     inverse_mass += _inverse_mass_at(constants, state, j, sub(point, offset), normal)
                 stop = -parting / inverse_mass
-                what, bounce = _bounce(world, constants, acceleration, i, j, -parting)
+                what, bounce = _bounce(world, constants, state, acceleration, i, j, -parting)
                 if what == LEFT or (leave_slow and what != STRUCK):
                     continue
                 outcome = what if outcome == NOTHING else min(outcome, what)

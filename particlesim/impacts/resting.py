@@ -42,7 +42,7 @@ _MAX_SWEEPS = 100
 _CONVERGED = 1e-9
 
 # Contacts that have sunk deeper than this fraction of the inscribed radius are lifted again, by a tenth at a time.
-DEEP = 1e-4
+DEEP = 2e-4
 
 # Columns of a contact point: normal, arms from the two centroids, what a unit impulse does to the two spins, by
 # how much it may close, effective mass.
