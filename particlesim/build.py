@@ -236,11 +236,10 @@ def _check_apart(scene: Scene, table: ShapeTable, world: World, constants: Const
     """No particle may start inside another or outside a wall; touching is allowed."""
     reach = constants.radius[:, None]
     pairs = find_pairs(state.position - reach, state.position + reach, period=world.period)
-    everyone = np.ones(len(constants.mass), dtype=np.bool_)
     points = np.empty((MAX_MANIFOLD, 3))
     for contacts in (
-        touching_walls(table, world, constants, state, everyone),
-        touching_pairs(table, world, constants, state, pairs, everyone),
+        touching_walls(table, world, constants, state),
+        touching_pairs(table, world, constants, state, pairs),
     ):
         for i, j in contacts.tolist():
             separation, _, _, _ = contact_now(table, world, constants, state, i, j, points)

@@ -30,7 +30,7 @@ class Ledger:
     impacts: int
     pairs_tested: int  # boxes compared by the broad phase
     candidate_pairs: int  # pairs it handed to the narrow phase
-    unresolved: int  # steps that ended while something still approached (see MAX_ROUNDS)
+    unresolved: int  # stretches of time in which more happened than was worked through (see MAX_IMPACTS)
     virial: float  # sum of r_ij . impulse over pair impacts [J s]
     wall_impulse: np.ndarray  # (6,) given to the walls -x, +x, -y, +y, -z, +z along their outward normals [N s]
     largest_overlap: float  # of two particles, or of a particle and a wall, at this time [m]

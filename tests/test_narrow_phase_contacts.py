@@ -101,7 +101,7 @@ def test_walls_against_all_vertices():
             deep = side * points[:count, axis]
             np.testing.assert_allclose(deep, reach_of(constants, state, i, axis, side), atol=1e-6)
     expected = [(i, -1 - wall) for i, wall in np.argwhere(gaps <= 0.0).tolist()]
-    found = touching_walls(TABLE, space, constants, state, np.ones(len(gaps), dtype=bool))
+    found = touching_walls(TABLE, space, constants, state)
     assert [tuple(row) for row in found.tolist()] == expected
     assert len(expected) > 100
 
@@ -111,11 +111,10 @@ def test_only_walls_are_touched(boundary):
     random = np.random.default_rng(2)
     space = world(3.0, boundary)
     constants, state = crowd(random, 200, 3.0)
-    moved = random.random(200) < 0.5
     gaps = walls_by_force(constants, state, space)
     solid = np.repeat(np.array(boundary) == WALL, 2)
-    expected = [(i, -1 - wall) for i, wall in np.argwhere((gaps <= 0.0) & solid & moved[:, None]).tolist()]
-    assert [tuple(row) for row in touching_walls(TABLE, space, constants, state, moved).tolist()] == expected
+    expected = [(i, -1 - wall) for i, wall in np.argwhere((gaps <= 0.0) & solid).tolist()]
+    assert [tuple(row) for row in touching_walls(TABLE, space, constants, state).tolist()] == expected
 
 
 @pytest.mark.parametrize(
@@ -147,13 +146,9 @@ def test_touching_pairs_of_a_crowd(boundary):
     constants, state = crowd(random, 60, 4.2)
     pairs = all_pairs(60)
     gaps = np.array([gap_by_force(constants, state, space, i, j) for i, j in pairs])
-    everyone = np.ones(60, dtype=bool)
-    found = touching_pairs(TABLE, space, constants, state, pairs, everyone)
+    found = touching_pairs(TABLE, space, constants, state, pairs)
     np.testing.assert_array_equal(found, pairs[gaps <= 0.0])
     assert 50 < len(found) < len(pairs)
-    moved = random.random(60) < 0.3
-    some = touching_pairs(TABLE, space, constants, state, pairs, moved)
-    np.testing.assert_array_equal(some, pairs[(gaps <= 0.0) & moved[pairs].any(axis=1)])
     walls = walls_by_force(constants, state, space)[:, np.repeat(np.array(boundary) == WALL, 2)]
     deepest = max(-gaps.min(), -walls.min(initial=0.0))
     assert deepest_overlap(TABLE, space, constants, state, pairs) == pytest.approx(deepest, abs=1e-13)
@@ -164,8 +159,8 @@ def test_nothing_overlaps_nothing():
     space = world(10.0)
     assert deepest_overlap(TABLE, space, constants, state, all_pairs(2)) == 0.0
     empty = np.empty((0, 2), dtype=np.int64)
-    assert touching_pairs(TABLE, space, constants, state, empty, np.ones(2, dtype=bool)).shape == (0, 2)
-    assert touching_walls(TABLE, space, constants, state, np.ones(2, dtype=bool)).shape == (0, 2)
+    assert touching_pairs(TABLE, space, constants, state, empty).shape == (0, 2)
+    assert touching_walls(TABLE, space, constants, state).shape == (0, 2)
 
 
 def test_the_number_of_threads_changes_nothing():
@@ -179,7 +174,7 @@ def test_the_number_of_threads_changes_nothing():
     try:
         for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
             numba.set_num_threads(threads)
-            found.append(touching_pairs(TABLE, space, constants, state, pairs, np.ones(200, dtype=bool)))
+            found.append(touching_pairs(TABLE, space, constants, state, pairs))
     finally:
         numba.set_num_threads(before)
     np.testing.assert_array_equal(found[0], found[1])

@@ -26,52 +26,37 @@ def wall_of_partner(partner):
 
 
 @kernel(inline=True)
-def contact_between(table, world, constants, i, j, position_i, turn_i, position_j, turn_j, points):
-    """Separation, normal, offset and number of contact points of particle i and partner j at the given poses.
+def contact_now(table, world, constants, state, i, j, points):
+    """Separation, normal, offset and number of contact points of particle i and partner j where they are now.
 
-    The normal and the offset point from i to j, points are relative to i's centroid; a wall has offset 0 and no pose.
+    The normal and the offset point from i to j, points are relative to i's centroid; a wall has offset 0.
     """
+    position, turn = row(state.position, i), row4(state.orientation, i)
     if j < 0:
+        wall = wall_of_partner(j)
         separation, count = wall_contact(
-            table, world, wall_of_partner(j), constants.shape[i], constants.size[i], turn_i, position_i, points
+            table, world, wall, constants.shape[i], constants.size[i], turn, position, points
         )
-        return separation, wall_normal(wall_of_partner(j)), (0.0, 0.0, 0.0), count
-    offset = nearest_image(sub(position_j, position_i), world.period)
-    separation, normal, count = pair_contact(
-        table,
-        constants.shape[i],
-        constants.size[i],
-        turn_i,
-        constants.shape[j],
-        constants.size[j],
-        turn_j,
-        offset,
-        points,
-    )
+        normal, offset = wall_normal(wall), (0.0, 0.0, 0.0)
+    else:
+        offset = nearest_image(sub(row(state.position, j), position), world.period)
+        separation, normal, count = pair_contact(
+            table,
+            constants.shape[i],
+            constants.size[i],
+            turn,
+            constants.shape[j],
+            constants.size[j],
+            row4(state.orientation, j),
+            offset,
+            points,
+        )
     return separation, normal, offset, count
 
 
-@kernel(inline=True)
-def contact_now(table, world, constants, state, i, j, points):
-    """The contact of particle i and partner j where they are now (see contact_between)."""
-    other = max(j, 0)
-    return contact_between(
-        table,
-        world,
-        constants,
-        i,
-        j,
-        row(state.position, i),
-        row4(state.orientation, i),
-        row(state.position, other),
-        row4(state.orientation, other),
-        points,
-    )
-
-
 @kernel
-def _mark_touching(table, world, constants, state, pairs, moved, touches, first, last):
-    """Mark which of the candidate pairs ``first .. last`` touch or overlap, of those with a particle that moved."""
+def _mark_touching(table, world, constants, state, pairs, touches, first, last):
+    """Mark which of the candidate pairs ``first .. last`` touch or overlap."""
     points = np.empty((MAX_MANIFOLD, 3))
     # Taken out of their structs once: each access counts references, which costs more than the arithmetic.
     position, orientation, period = state.position, state.orientation, world.period
@@ -79,34 +64,30 @@ def _mark_touching(table, world, constants, state, pairs, moved, touches, first,
     for k in range(first, last):
         i, j = pairs[k, 0], pairs[k, 1]
         touches[k] = False
-        if moved[i] or moved[j]:
-            offset = nearest_image(sub(row(position, j), row(position, i)), period)
-            reach = radius[i] + radius[j]
-            if dot(offset, offset) <= reach * reach:
-                touches[k] = pair_overlaps(
-                    table,
-                    shape[i],
-                    size[i],
-                    row4(orientation, i),
-                    shape[j],
-                    size[j],
-                    row4(orientation, j),
-                    offset,
-                    points,
-                )
+        offset = nearest_image(sub(row(position, j), row(position, i)), period)
+        reach = radius[i] + radius[j]
+        if dot(offset, offset) <= reach * reach:
+            touches[k] = pair_overlaps(
+                table,
+                shape[i],
+                size[i],
+                row4(orientation, i),
+                shape[j],
+                size[j],
+                row4(orientation, j),
+                offset,
+                points,
+            )
 
 
 def touching_pairs(
-    table: ShapeTable, world: World, constants: Constants, state: State, pairs: np.ndarray, moved: np.ndarray
+    table: ShapeTable, world: World, constants: Constants, state: State, pairs: np.ndarray
 ) -> np.ndarray:
-    """The candidate pairs (m, 2) that touch or overlap, in the order of ``pairs``.
-
-    Only pairs with a particle marked in ``moved`` (n,) are looked at.
-    """
+    """The candidate pairs (m, 2) that touch or overlap, in the order of ``pairs``."""
     touches = np.empty(len(pairs), dtype=np.bool_)
     with Crew(len(pairs)) as crew:
         crew.each(
-            lambda _, first, last: _mark_touching(table, world, constants, state, pairs, moved, touches, first, last),
+            lambda _, first, last: _mark_touching(table, world, constants, state, pairs, touches, first, last),
             len(pairs),
         )
     return pairs[touches]
@@ -121,8 +102,8 @@ def _near_wall(lower, upper, boundary, position, radius, wall):
 
 
 @kernel
-def touching_walls(table, world, constants, state, moved):
-    """Particles marked in ``moved`` that touch or cross a wall, (m, 2): the particle and the wall as partner."""
+def touching_walls(table, world, constants, state):
+    """Particles that touch or cross a wall, (m, 2): the particle and the wall as partner."""
     # Taken out of their structs once: each access counts references, which costs more than the arithmetic.
     position, orientation = state.position, state.orientation
     shape, size, radius = constants.shape, constants.size, constants.radius
@@ -131,8 +112,6 @@ def touching_walls(table, world, constants, state, moved):
     found = np.empty((64, 2), dtype=np.int64)
     count = 0
     for i in range(len(radius)):
-        if not moved[i]:
-            continue
         where = row(position, i)
         for wall in range(6):
             if not _near_wall(lower, upper, boundary, where, radius[i], wall):
@@ -161,7 +140,6 @@ def _deepest_of(table, world, constants, state, contacts):
 
 def deepest_overlap(table: ShapeTable, world: World, constants: Constants, state: State, pairs: np.ndarray) -> float:
     """The largest overlap among candidate pairs and with walls [m]; 0 if nothing overlaps."""
-    everyone = np.ones(len(constants.mass), dtype=np.bool_)
     where = table, world, constants, state
-    touching = touching_pairs(*where, pairs, everyone), touching_walls(*where, everyone)
+    touching = touching_pairs(*where, pairs), touching_walls(*where)
     return max(_deepest_of(*where, contacts) for contacts in touching)
