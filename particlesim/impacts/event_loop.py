@@ -199,6 +199,8 @@ def run_islands(
     Returns the pieces of path and whose they are, and how many islands were left with impacts to answer.
     """
     table, world, constants, state, course = borrowed((table, world, constants, state, course))
+    start, other, met, times, first_met = borrowed((start, other, met, times, first_met))
+    edges, member, tally = borrowed((edges, member, tally))
     stamp, head = course.stamp, course.head
     points = np.empty((MAX_MANIFOLD, 3))
     contacts, whom = np.empty((64, 2), dtype=np.int64), np.empty(128, dtype=np.int64)

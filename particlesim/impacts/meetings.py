@@ -74,6 +74,7 @@ def _wall_met(table, world, constants, state, course, i, wall, duration, points)
 def _look_closer(table, world, constants, state, course, log, pairs, times, duration, first, last):
     """Fill in the times of pairs ``first .. last`` where they are -1."""
     table, world, constants, state, course, log = borrowed((table, world, constants, state, course, log))
+    pairs, times = borrowed((pairs, times))
     points = np.empty((MAX_MANIFOLD, 3))
     for k in range(first, last):
         if times[k] < 0.0:

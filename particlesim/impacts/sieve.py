@@ -12,7 +12,7 @@ import numpy as np
 
 from particlesim.constants import SPHERE, WALL
 from particlesim.impacts.time_of_impact import sphere_meets_wall, spheres_meet
-from particlesim.jit import kernel
+from particlesim.jit import borrowed, kernel
 from particlesim.narrow_phase.contacts import wall_as_partner
 from particlesim.narrow_phase.pair import nearest_image
 from particlesim.vec import dot, norm, row, sub
@@ -59,6 +59,10 @@ def sieve(
     Returns (m, 2) and times (m, 1): when they meet, or -1 where the bounding spheres come together and more must be
     known.
     """
+    kind, shape, radius, position, velocity, acceleration = borrowed(
+        (kind, shape, radius, position, velocity, acceleration)
+    )
+    lower, upper, boundary, period, start, other = borrowed((lower, upper, boundary, period, start, other))
     found, times = np.empty((256, 2), dtype=np.int64), np.empty((256, 1))
     count = 0
     walls = boundary[0] == WALL or boundary[1] == WALL or boundary[2] == WALL
