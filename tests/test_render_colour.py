@@ -87,7 +87,7 @@ def test_readout_says_what_the_ledger_knows():
         ("time", "1.50 s"),
         ("particles", "1,234"),
         ("impacts", "12,345"),
-        ("energy change", "–2.5 %"),
+        ("energy change", "-2.5 %"),
     ]
     assert [name for name, _ in readout_rows(frame(np.zeros((1, 3))), first)] == ["time", "particles"]
     assert readout_rows(first, first)[-1] == ("energy change", "0")

@@ -191,11 +191,11 @@ class Flight:
         return missed_meetings(self._where(log), self._neighbours, moved, duration)
 
     def _book(self, touched: np.ndarray, unfinished: int) -> None:
-        """Add what the islands tallied to the counts, in the order of the islands."""
+        """Add what the islands tallied, in their order, and what resting contacts bore to the counts."""
         total = self._tally[touched].sum(axis=0)
         self.counts.impacts += int(total[IMPACTS])
-        self.counts.virial += float(total[VIRIAL])
-        self.counts.wall_impulse += total[WALLS:]
+        self.counts.virial += float(total[VIRIAL]) + self._resting.virial
+        self.counts.wall_impulse += total[WALLS:] + self._resting.wall_impulse
         self.counts.unresolved += unfinished > 0
 
     def _fly_on(self, duration: float) -> None:

@@ -304,6 +304,8 @@ class Resting:
         self._keys, self._forces = np.empty(0, dtype=np.int64), np.empty(0)
         self.longest_stretch = self._longest_stretch()
         self._held = np.empty(0, dtype=np.int64)
+        self.wall_impulse: np.ndarray = np.zeros(6)  # of the last stretch [N s]
+        self.virial = 0.0  # of the last stretch [J s]
         self._before: tuple[np.ndarray, np.ndarray] | None = None
 
     def _longest_stretch(self) -> float:
@@ -322,6 +324,7 @@ class Resting:
         partner, point = find_resting(self._table, self._world, constants, state, neighbours.start, neighbours.other)
         self._held = np.unique(partner[partner >= 0])
         self._before = state.velocity[self._held], state.angular_momentum[self._held]
+        self.wall_impulse, self.virial = np.zeros(6), 0.0
         if not len(partner):
             return
         keys = self._keys_of(partner)
@@ -331,6 +334,11 @@ class Resting:
         press(partner, point, constants.mass, velocity, spins(constants, state), duration, small, impulse)
         hold_pressed(partner, point, impulse, velocity, state, acceleration)
         self._keys, self._forces = keys, impulse / duration
+        on_wall = partner[:, 1] < 0
+        self.wall_impulse = np.bincount(-1 - partner[on_wall, 1], impulse[on_wall], minlength=6)
+        offset = point[:, ARM_I : ARM_I + 3] - point[:, ARM_J : ARM_J + 3]
+        along_normal = (offset * point[:, NORMAL : NORMAL + 3]).sum(axis=1)
+        self.virial = float((impulse * along_normal)[~on_wall].sum())
 
     def release(self) -> None:
         """Undo what the last ``hold`` did to the state."""

@@ -94,6 +94,5 @@ def _grouped(number: int) -> str:
 def _change_text(change: float) -> str:
     if change == 0.0:
         return "0"
-    # An en dash: as wide as the plus sign, and the font has no minus sign.
-    text = f"{100.0 * change:+.1f} %" if abs(change) >= 1e-3 else f"{change:+.0e}"
-    return text.replace("-", "\u2013")
+    # With the hyphen for a minus sign: the font has no other in every version of its library.
+    return f"{100.0 * change:+.1f} %" if abs(change) >= 1e-3 else f"{change:+.0e}"
