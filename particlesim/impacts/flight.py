@@ -174,13 +174,12 @@ class Flight:
         """Pairs (m, 2) of different islands that meet after all, of those whose pieces of path start there."""
         course = self._course
         deflected = np.unique(log.particle[first_piece:])
-        linked = missed_meetings(self._where(log), self._neighbours, deflected, duration)
         on_leash = all_on_leash(
             log.piece, log.particle, self._state, course.clock, course.acceleration,
             self._neighbours.anchor, self._neighbours.leash, self._world.period, duration, first_piece, deflected,
         )  # fmt: skip
-        if len(linked) or on_leash:
-            return linked
+        if on_leash:
+            return missed_meetings(self._where(log), self._neighbours, deflected, duration)
         # Longer leashes for those that went astray: nobody goes farther than at his greatest speed all the time.
         speed = np.linalg.norm(log.piece[:, 8:11], axis=1) + np.linalg.norm(self._world.gravity) * duration
         np.maximum.at(self._leash, log.particle, 1.1 * speed * duration)
