@@ -6,7 +6,7 @@ import importlib.metadata
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -182,17 +182,11 @@ def render(
 ) -> None:
     """Simulate a scene, or read a trajectory, and make a movie of it, with a poster (PNG) beside it."""
     with _one_line_errors(source):
-        from particlesim.progress import shown_progress  # noqa: PLC0415
-
         movable = source if source.suffix.lower() == ".gsd" else _load(source)
         from particlesim.pipeline import render as make_movie  # noqa: PLC0415
 
         with _output(output, source, ".mp4") as path:
-            with shown_progress(quiet) as progress:
-                summary = make_movie(movable, path, progress=progress, threads=threads)
-            if not quiet:
-                _print_summary(summary, path)
-            _check_drift(summary, path, max_drift)
+            _make(make_movie, movable, path, quiet, threads, max_drift)
 
 
 @app.command(short_help="Simulate a scene and write its trajectory.")
@@ -207,17 +201,24 @@ def simulate(
 ) -> None:
     """Simulate a scene and write its trajectory (GSD): no OpenGL, no movie."""
     with _one_line_errors(scene):
-        from particlesim.progress import shown_progress  # noqa: PLC0415
-
         loaded = _load(scene)
         from particlesim.pipeline import simulate as write_trajectory  # noqa: PLC0415
 
         with _output(output, scene, ".gsd") as path:
-            with shown_progress(quiet) as progress:
-                summary = write_trajectory(loaded, path, progress=progress, threads=threads)
-            if not quiet:
-                _print_summary(summary, path)
-            _check_drift(summary, path, max_drift)
+            _make(write_trajectory, loaded, path, quiet, threads, max_drift)
+
+
+def _make(
+    make: Callable[..., Summary], source: Any, path: Path, quiet: bool, threads: int | None, max_drift: float | None
+) -> None:
+    """Make a movie or a trajectory, showing progress and what it amounted to."""
+    from particlesim.progress import shown_progress  # noqa: PLC0415
+
+    with shown_progress(quiet) as progress:
+        summary = make(source, path, progress=progress, threads=threads)
+    if not quiet:
+        _print_summary(summary, path)
+    _check_drift(summary, path, max_drift)
 
 
 @app.command(short_help="Validate a scene and say what it amounts to.")

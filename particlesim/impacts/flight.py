@@ -46,7 +46,7 @@ class Counts:
     wall_impulse: np.ndarray = field(default_factory=lambda: np.zeros(6))  # outward, on each wall [N s]
     pairs_tested: int = 0  # boxes compared by the broad phase
     candidate_pairs: int = 0  # pairs it found
-    unresolved: int = 0  # stretches of time that ended while something still approached (see MAX_IMPACTS)
+    unresolved: int = 0  # stretches of time in which more happened than was worked through (see MAX_IMPACTS)
 
 
 class Flight:

@@ -47,7 +47,7 @@ def _inverse_mass_at(constants, state, i, arm, normal):
 
 
 @kernel
-def _approach(still, constants, state, i, j, point, offset, normal):
+def approach(still, constants, state, i, j, point, offset, normal):
     """Speed at which the partners part at a point (negative: they approach), and the speed that counts as none."""
     of_i = _point_velocity(constants, state, i, point)
     parting = -dot(of_i, normal)
@@ -94,22 +94,23 @@ def _point_to_answer(still, constants, state, i, j, points, count, offset, norma
     middle and does not start to spin.
     """
     point = _middle(points, count)
-    parting, tolerance = _approach(still, constants, state, i, j, point, offset, normal)
+    parting, tolerance = approach(still, constants, state, i, j, point, offset, normal)
     if parting >= -tolerance:
         parting = 0.0
         for k in range(count):
-            at_corner, small = _approach(still, constants, state, i, j, row(points, k), offset, normal)
+            at_corner, small = approach(still, constants, state, i, j, row(points, k), offset, normal)
             if at_corner < parting and at_corner < -small:
                 parting, point = at_corner, row(points, k)
     return point, parting
 
 
 @kernel
-def _stretch(constants, state, whom, size, push, twist, work, loss, kept):
+def _stretch(constants, state, whom, size, push, twist, gain):
     """The factor on all impulses that leaves the energy which the restitutions say.
 
-    Along the impulses the kinetic energy is a parabola: work s + D s^2 / 2. Its lowest point is a fully inelastic
-    impact, the mirror image of where it started an elastic one. ``loss`` and ``kept`` weigh the restitutions.
+    Along the impulses the kinetic energy is a parabola. Its lowest point is a fully inelastic impact, the mirror image
+    of where it started an elastic one. ``gain`` is what the impulses, each with its own restitution, would take and
+    give back if they did not act on the same bodies.
     """
     growth = 0.0
     for k in range(size):
@@ -118,7 +119,7 @@ def _stretch(constants, state, whom, size, push, twist, work, loss, kept):
         momentum = row(twist, k)
         spin = spin_of(row4(state.orientation, i), momentum, row(constants.inertia, i))
         growth += dot(change, change) / constants.mass[i] + dot(momentum, spin)
-    return -work / growth * kept / loss
+    return gain / growth
 
 
 @kernel
@@ -176,7 +177,7 @@ def answer(table, world, constants, state, acceleration, contacts, count, whom, 
     """
     points = np.empty((count, MAX_MANIFOLD, 3))
     corners = np.empty(count, dtype=np.int64)
-    normals, offsets, where = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
+    normals, offsets = np.empty((count, 3)), np.empty((count, 3))
     impulse = np.empty(count)
     answered = np.empty(count, dtype=np.bool_)
     push, twist = np.empty((size, 3)), np.empty((size, 3))
@@ -191,7 +192,7 @@ def answer(table, world, constants, state, acceleration, contacts, count, whom, 
         for k in range(size):
             put(push, k, (0.0, 0.0, 0.0))
             put(twist, k, (0.0, 0.0, 0.0))
-        work = loss = kept = 0.0
+        gain = 0.0
         for c in range(count):
             i, j = contacts[c, 0], contacts[c, 1]
             normal, offset = row(normals, c), row(offsets, c)
@@ -209,10 +210,7 @@ def answer(table, world, constants, state, acceleration, contacts, count, whom, 
                     continue
                 outcome = what if outcome == NOTHING else min(outcome, what)
                 impulse[c] = bounce * stop
-                work += impulse[c] * parting
-                loss += bounce * bounce * stop * -parting
-                kept += bounce * stop * -parting
-                put(where, c, point)
+                gain += bounce * bounce * stop * -parting
                 slot = _slot(whom, size, i)
                 put(push, slot, along(row(push, slot), normal, -impulse[c]))
                 put(twist, slot, along(row(twist, slot), cross(point, normal), -impulse[c]))
@@ -220,9 +218,9 @@ def answer(table, world, constants, state, acceleration, contacts, count, whom, 
                     slot = _slot(whom, size, j)
                     put(push, slot, along(row(push, slot), normal, impulse[c]))
                     put(twist, slot, along(row(twist, slot), cross(sub(point, offset), normal), impulse[c]))
-        if work == 0.0:
+        if gain == 0.0:
             break
-        factor = 1.0 if count == 1 else _stretch(constants, state, whom, size, push, twist, work, kept, loss)
+        factor = 1.0 if count == 1 else _stretch(constants, state, whom, size, push, twist, gain)
         for k in range(size):
             i = whom[k]
             put(state.velocity, i, along(row(state.velocity, i), row(push, k), factor / constants.mass[i]))

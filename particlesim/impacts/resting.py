@@ -24,10 +24,10 @@ from particlesim.constants import (
     WALL,
 )
 from particlesim.impacts.neighbours import Neighbours
-from particlesim.impacts.response import restitution_of
+from particlesim.impacts.response import approach, restitution_of
 from particlesim.impacts.sieve import grown
 from particlesim.jit import borrowed, kernel
-from particlesim.motion import particle_spin, spin_of, spins
+from particlesim.motion import spin_of, spins
 from particlesim.narrow_phase.contacts import wall_as_partner, wall_of_partner
 from particlesim.narrow_phase.hull_hull import tilted_patch
 from particlesim.narrow_phase.pair import nearest_image, pair_contact
@@ -110,15 +110,6 @@ def _pair_points(table, world, constants, state, i, j, band, points, gaps):
 
 
 @kernel(inline=True)
-def _parting(constants, state, i, j, arm, arm_j, normal):
-    """Speed at which two partners part at a point."""
-    parting = -dot(normal, add(row(state.velocity, i), cross(particle_spin(constants, state, i), arm)))
-    if j >= 0:
-        parting += dot(normal, add(row(state.velocity, j), cross(particle_spin(constants, state, j), arm_j)))
-    return parting
-
-
-@kernel(inline=True)
 def _twist(constants, state, i, arm, normal):
     """The spin that a unit impulse along ``normal`` at ``arm`` gives particle ``i``."""
     return spin_of(row4(state.orientation, i), cross(arm, normal), row(constants.inertia, i))
@@ -150,7 +141,7 @@ def _add_contact(table, world, constants, state, i, j, points, gaps, partner, po
     for k in range(count):
         arm = row(points, k)
         arm_j = sub(arm, offset)
-        before = _parting(constants, state, i, j, arm, arm_j, normal)
+        before, _ = approach(world.still, constants, state, i, j, arm, offset, normal)
         if abs(before) > slow:
             return size
         m = size + k
