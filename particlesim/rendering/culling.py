@@ -6,45 +6,65 @@ import math
 
 import numpy as np
 
+from particlesim.crew import Crew
 from particlesim.jit import kernel
-
-# Edge of the squares in which coverage is noted [pixels]: smaller ones find more, larger ones cost less.
-_SQUARE = 1
+from particlesim.rendering.outlook import Outlook, nearest_first
 
 
-def in_sight(seen: np.ndarray, inner: np.ndarray, outer: np.ndarray, slope: float, size: tuple[int, int]) -> np.ndarray:
-    """Which particles may be seen, (n,) bool; those left out change no pixel.
+def in_sight(outlook: Outlook, position: np.ndarray, inner: np.ndarray, outer: np.ndarray) -> np.ndarray:
+    """Particles that may be seen, (k,) int64, roughly the nearer ones first; those left out change no pixel.
 
-    ``seen`` (n, 3) float64: centres in camera axes [m], nearest first (by their distance along the camera's axis);
-    ``inner`` and ``outer`` (n,) radii of spheres within and about each particle [m]; ``slope``: tangent of half the
-    vertical field of view; ``size``: width and height of the picture [pixels].
+    ``position`` (n, 3) float64; ``inner`` and ``outer`` (n,) float64, radii of spheres within and about each [m].
     """
-    scale = 0.5 * size[1] / (slope * _SQUARE)
-    squares = np.full((-(-size[1] // _SQUARE), -(-size[0] // _SQUARE)), np.inf)
-    visible = np.ones(len(seen), dtype=np.bool_)
-    _mark_visible(seen, inner, outer, scale, 0.5 * size[0] / _SQUARE, 0.5 * size[1] / _SQUARE, squares, visible)
-    return visible
+    order = nearest_first(outlook, position)
+    eye, slack = np.ascontiguousarray(outlook.eye), outlook.slack
+    axes = np.ascontiguousarray(outlook.axes)
+
+    def seen(_: int, first: int, last: int) -> np.ndarray:
+        squares = np.full((outlook.size[1], last - first), np.inf)
+        visible = np.zeros(len(position), dtype=np.bool_)
+        middle = (0.5 * outlook.size[0] - first, 0.5 * outlook.size[1])
+        _mark_visible(
+            position, inner, outer, order, axes, eye, outlook.parallel, outlook.scale, middle, slack, squares, visible
+        )
+        return visible
+
+    # Each thread looks at a strip of the picture: what hides what in it is told by that strip alone.
+    with Crew(len(position)) as crew:
+        strips = crew.each(seen, outlook.size[0])
+    return order[np.logical_or.reduce(strips)[order]]
 
 
 @kernel
-def _mark_visible(seen, inner, outer, scale, middle_x, middle_y, squares, visible):
+def _mark_visible(position, inner, outer, order, axes, eye, parallel, scale, middle, slack, squares, visible):
     """``squares`` keeps the distance behind which nothing is seen through each square of the picture."""
-    for i in range(len(seen)):
-        x, y, away = seen[i, 0], seen[i, 1], -seen[i, 2]
+    for i in order:
+        dx, dy, dz = position[i, 0] - eye[0], position[i, 1] - eye[1], position[i, 2] - eye[2]
+        x = axes[0, 0] * dx + axes[0, 1] * dy + axes[0, 2] * dz
+        y = axes[1, 0] * dx + axes[1, 1] * dy + axes[1, 2] * dz
+        away = axes[2, 0] * dx + axes[2, 1] * dy + axes[2, 2] * dz
         near, far = away - outer[i], away + outer[i]
-        if near <= 0.0:
-            # About or behind the camera: some of it may be seen.
+        if parallel:
+            least = most = middle_scale = scale
+        elif near > 0.0:
+            # Squares a metre where the particle is farthest, nearest and in its middle.
+            least, most, middle_scale = scale / far, scale / near, scale / away
+        else:
+            # About or behind the one who looks: some of it may be seen.
+            visible[i] = True
             continue
-        # The square about the particle, as large on the picture as any part of it is.
-        left = middle_x + scale * min((x - outer[i]) / near, (x - outer[i]) / far)
-        right = middle_x + scale * max((x + outer[i]) / near, (x + outer[i]) / far)
-        low = middle_y + scale * min((y - outer[i]) / near, (y - outer[i]) / far)
-        high = middle_y + scale * max((y + outer[i]) / near, (y + outer[i]) / far)
-        visible[i] = _any_open(squares, left, right, low, high, near)
-        if visible[i]:
+        # The rectangle about the particle, as large in the picture as any part of it is.
+        left, right = x - outer[i], x + outer[i]
+        low, high = y - outer[i], y + outer[i]
+        left = middle[0] + left * (most if left < 0.0 else least)
+        right = middle[0] + right * (most if right > 0.0 else least)
+        low = middle[1] + low * (most if low < 0.0 else least)
+        high = middle[1] + high * (most if high > 0.0 else least)
+        if _any_open(squares, left, right, low, high, near):
+            visible[i] = True
             # Every ray through the disc that cuts the inner sphere in half meets that sphere before the disc.
-            cover = scale * inner[i] / away
-            _cover(squares, middle_x + scale * x / away, middle_y + scale * y / away, cover, away)
+            at_x, at_y = middle[0] + middle_scale * x, middle[1] + middle_scale * y
+            _cover(squares, at_x, at_y, middle_scale * inner[i], away + slack * outer[i])
 
 
 @kernel

@@ -34,8 +34,6 @@ from pyrender.shader_program import ShaderProgram  # noqa: E402
 
 _SHADERS = Path(__file__).with_name("shaders")
 _FLOAT = 4  # bytes
-_SAMPLES = 4  # a pixel; what the sphere shader's mask is written for
-_SHADOW_SHARE = 1.2  # edge of the shadow map, in heights of the picture: a texel is then about as large as a pixel
 _VIEW_BLOCK = 0  # binding point of the uniform block that all programs share
 
 
@@ -47,15 +45,20 @@ class Kind:
     vertex: tuple[int, ...]  # floats of each vertex attribute, the first three being a place
     instance: tuple[int, ...]  # floats of each instance attribute
     mode: int = gl.GL_TRIANGLES
-    shadow: bool = False  # casts one
-    cull: bool = False  # only faces towards the camera are drawn, only those away from the light cast a shadow
-    blend: bool = False  # lets through what is behind it, and hides nothing
+    casts: bool = False  # drawn into the shadow map, and not into the picture
+    cull: int | None = None  # the side of faces that is not drawn
+    # How it is laid over what is there, without hiding what comes later: factors of the new and of the old colour.
+    blend: tuple[int, int] | None = None
 
 
-SPHERE = Kind("sphere", (3,), (4, 3), gl.GL_TRIANGLE_STRIP, shadow=True)
-HULL = Kind("hull", (3, 3, 4), (4, 4, 3), shadow=True, cull=True)
+SPHERE = Kind("sphere", (3,), (4, 4), gl.GL_TRIANGLE_STRIP)
+HULL = Kind("hull", (3, 3, 4), (4, 4, 4), cull=gl.GL_BACK)
+SPHERE_SHADOW = Kind("sphere_shadow", (3,), (4,), gl.GL_TRIANGLE_STRIP, casts=True)
+# Of hulls the faces away from the light cast the shadow: rounding then puts none on the faces towards it.
+HULL_SHADOW = Kind("hull_shadow", (3,), (4, 4), casts=True, cull=gl.GL_FRONT)
 FLOOR = Kind("floor", (3,), (), gl.GL_TRIANGLE_STRIP)
-LINE = Kind("line", (3,), (4, 3, 4), gl.GL_TRIANGLE_STRIP, blend=True)
+CONTACT = Kind("contact", (3,), (4,), gl.GL_TRIANGLE_STRIP, blend=(gl.GL_ZERO, gl.GL_SRC_COLOR))
+LINE = Kind("line", (3,), (4, 3, 4), gl.GL_TRIANGLE_STRIP, blend=(gl.GL_SRC_ALPHA, gl.GL_ONE_MINUS_SRC_ALPHA))
 
 
 class Layer(pyrender.Primitive):
@@ -71,16 +74,11 @@ class Layer(pyrender.Primitive):
         self._order = np.ascontiguousarray(order, dtype=np.uint32).ravel()
         self._vertices = np.ascontiguousarray(vertices, dtype=np.float32)
         self._rows = np.zeros((0 if kind.instance else 1, sum(kind.instance)), dtype=np.float32)
-        self.visible = len(self._rows)
         self._stale = False
 
-    def put(self, rows: np.ndarray, visible: int | None = None) -> None:
-        """Replace the instances: (n, sum of kind.instance) float32. They reach the GPU with the next drawing.
-
-        Only the first ``visible`` are in the picture; the others cast shadows all the same.
-        """
+    def put(self, rows: np.ndarray) -> None:
+        """Replace the instances: (n, sum of kind.instance) float32. They reach the GPU with the next drawing."""
         self._rows = np.ascontiguousarray(rows, dtype=np.float32)
-        self.visible = len(self._rows) if visible is None else visible
         self._stale = True
 
     @property
@@ -88,16 +86,17 @@ class Layer(pyrender.Primitive):
         """How many instances there are."""
         return len(self._rows)
 
-    def draw(self, count: int) -> None:
-        """Draw the first ``count`` instances with the program in use."""
-        if not count:
+    def draw(self) -> None:
+        """Draw the instances with the program in use."""
+        if not self.count:
             return
         self._bind()
         if self._stale:
             gl.glBindBuffer(gl.GL_ARRAY_BUFFER, self._buffers[1])
             gl.glBufferData(gl.GL_ARRAY_BUFFER, self._rows.nbytes, self._rows, gl.GL_STREAM_DRAW)
             self._stale = False
-        gl.glDrawElementsInstanced(self.kind.mode, len(self._order), gl.GL_UNSIGNED_INT, ctypes.c_void_p(0), count)
+        order, none = len(self._order), ctypes.c_void_p(0)
+        gl.glDrawElementsInstanced(self.kind.mode, order, gl.GL_UNSIGNED_INT, none, self.count)
         self._unbind()
 
     def _add_to_context(self) -> None:
@@ -144,7 +143,7 @@ class Program(ShaderProgram):
 class _KeyLight(pyrender.DirectionalLight):
     """The light that casts shadows, with a map that is looked up between its texels."""
 
-    def __init__(self, pixels: int) -> None:
+    def __init__(self, pixels: tuple[int, int]) -> None:
         super().__init__()
         self.pixels = pixels
 
@@ -159,39 +158,40 @@ class _KeyLight(pyrender.DirectionalLight):
             sampler=smooth,
             source_channels="D",
             data_format=gl.GL_FLOAT,
-            width=self.pixels,
-            height=self.pixels,
+            width=self.pixels[0],
+            height=self.pixels[1],
         )
 
 
 class _Renderer(pyrender.Renderer):
-    """Draws the layers of a scene: shadow map, then one picture of four samples a pixel."""
+    """Draws the layers of a scene: the shadow map, then the picture, ``samples`` by ``samples`` to a pixel."""
 
-    _main_fb: int | None
-    _main_fb_ms: int | None
-
-    def __init__(self, width: int, height: int) -> None:
-        super().__init__(width, height)
+    def __init__(self, size: tuple[int, int], samples: int, smooth: bool) -> None:
+        super().__init__(samples * size[0], samples * size[1])
+        self._size = size
+        self._smooth = smooth
         self._programs: dict[str, Program] = {}
         self._block = gl.glGenBuffers(1)
         self.view_block = np.zeros(0, dtype=np.float32)
+        self._drawn = _Target(samples * size[0], samples * size[1], depth=True)
+        self._final = _Target(*size, depth=False)
+        self._nothing = gl.glGenVertexArrays(1)
 
     def render(self, scene: pyrender.Scene, flags: int, seg_node_map: Any = None) -> np.ndarray:
+        block = np.ascontiguousarray(self.view_block)
         gl.glBindBufferBase(gl.GL_UNIFORM_BUFFER, _VIEW_BLOCK, self._block)
-        gl.glBufferData(
-            gl.GL_UNIFORM_BUFFER, self.view_block.nbytes, np.ascontiguousarray(self.view_block), gl.GL_STREAM_DRAW
-        )
+        gl.glBufferData(gl.GL_UNIFORM_BUFFER, block.nbytes, block, gl.GL_STREAM_DRAW)
         return super().render(scene, flags, seg_node_map)
 
     def __del__(self) -> None:
         # pyrender deletes objects by number here, in whatever context is then current. Ours go with their context.
         pass
 
-    def _use(self, name: str) -> None:
-        if name not in self._programs:
-            self._programs[name] = Program(str(_SHADERS / f"{name}.vert"), str(_SHADERS / f"{name}.frag"))
-            self._programs[name]._add_to_context()
-        self._programs[name]._bind()
+    def _use(self, vertex: str, fragment: str) -> None:
+        if fragment not in self._programs:
+            self._programs[fragment] = Program(str(_SHADERS / f"{vertex}.vert"), str(_SHADERS / f"{fragment}.frag"))
+            self._programs[fragment]._add_to_context()
+        self._programs[fragment]._bind()
 
     def _shadow_mapping_pass(self, scene: pyrender.Scene, light_node: Any, flags: int) -> None:
         texture = light_node.light.shadow_texture
@@ -202,94 +202,124 @@ class _Renderer(pyrender.Renderer):
         texture._bind_as_depth_attachment()
         gl.glDrawBuffer(gl.GL_NONE)
         gl.glReadBuffer(gl.GL_NONE)
-        gl.glViewport(0, 0, light_node.light.pixels, light_node.light.pixels)
+        gl.glViewport(0, 0, *light_node.light.pixels)
         gl.glEnable(gl.GL_DEPTH_TEST)
         gl.glDepthMask(gl.GL_TRUE)
-        gl.glDisable(gl.GL_BLEND)
         # What has left the box of the map towards the light casts its shadow all the same.
         gl.glEnable(gl.GL_DEPTH_CLAMP)
         gl.glClear(gl.GL_DEPTH_BUFFER_BIT)
-        for layer in _layers(scene):
-            if layer.kind.shadow:
-                self._use(f"{layer.kind.name}_shadow")
-                self._cull(layer.kind.cull, gl.GL_FRONT)
-                layer.draw(layer.count)
+        self._draw_layers(scene, casts=True)
 
     def _forward_pass(self, scene: pyrender.Scene, flags: int, seg_node_map: Any = None) -> np.ndarray:
-        self._configure_forward_pass_viewport(flags)
-        gl.glEnable(gl.GL_MULTISAMPLE)
+        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, self._drawn.framebuffer)
+        gl.glViewport(0, 0, self.viewport_width, self.viewport_height)
+        gl.glEnable(gl.GL_DEPTH_TEST)
+        gl.glDepthMask(gl.GL_TRUE)
         gl.glDisable(gl.GL_DEPTH_CLAMP)
         gl.glClearColor(*scene.bg_color)
         gl.glClear(gl.GL_COLOR_BUFFER_BIT | gl.GL_DEPTH_BUFFER_BIT)
-        gl.glBlendFunc(gl.GL_SRC_ALPHA, gl.GL_ONE_MINUS_SRC_ALPHA)
         for light in scene.lights:
             gl.glActiveTexture(gl.GL_TEXTURE0)
             light.shadow_texture._bind()
-        for layer in _layers(scene):
-            self._use(layer.kind.name)
-            self._cull(layer.kind.cull, gl.GL_BACK)
-            (gl.glEnable if layer.kind.blend else gl.glDisable)(gl.GL_BLEND)
-            gl.glDepthMask(not layer.kind.blend)
-            layer.draw(layer.visible)
+        self._draw_layers(scene, casts=False)
         return self._read_main_framebuffer(scene, flags)
 
-    @staticmethod
-    def _cull(wanted: bool, side: int) -> None:
-        (gl.glEnable if wanted else gl.glDisable)(gl.GL_CULL_FACE)
-        gl.glCullFace(side)
-
-    def _configure_main_framebuffer(self) -> None:
-        if self._main_fb is not None:
-            return
-        size = self.viewport_width, self.viewport_height
-        self._main_cb, self._main_cb_ms, self._main_db_ms = (int(b) for b in gl.glGenRenderbuffers(3))
-        self._main_db = 0
-        plain, multisampled = (int(f) for f in gl.glGenFramebuffers(2))
-        self._main_fb, self._main_fb_ms = plain, multisampled
-        self._attach(plain, gl.GL_COLOR_ATTACHMENT0, self._main_cb, gl.GL_RGBA8, 0)
-        self._attach(multisampled, gl.GL_COLOR_ATTACHMENT0, self._main_cb_ms, gl.GL_RGBA8, _SAMPLES)
-        self._attach(multisampled, gl.GL_DEPTH_ATTACHMENT, self._main_db_ms, gl.GL_DEPTH_COMPONENT24, _SAMPLES)
-        if gl.glCheckFramebufferStatus(gl.GL_FRAMEBUFFER) != gl.GL_FRAMEBUFFER_COMPLETE:
-            raise ValueError(f"no frame buffer with {_SAMPLES} samples a pixel")
-        self._main_fb_dims = size
-
-    def _attach(self, framebuffer: int, point: int, buffer: int, form: int, samples: int) -> None:
-        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, framebuffer)
-        gl.glBindRenderbuffer(gl.GL_RENDERBUFFER, buffer)
-        gl.glRenderbufferStorageMultisample(
-            gl.GL_RENDERBUFFER, samples, form, self.viewport_width, self.viewport_height
-        )
-        gl.glFramebufferRenderbuffer(gl.GL_FRAMEBUFFER, point, gl.GL_RENDERBUFFER, buffer)
+    def _draw_layers(self, scene: pyrender.Scene, casts: bool) -> None:
+        for layer in (layer for mesh in scene.meshes for layer in mesh.primitives if layer.kind.casts == casts):
+            kind = layer.kind
+            self._use(kind.name, kind.name)
+            (gl.glDisable if kind.cull is None else gl.glEnable)(gl.GL_CULL_FACE)
+            gl.glCullFace(kind.cull or gl.GL_BACK)
+            (gl.glEnable if kind.blend else gl.glDisable)(gl.GL_BLEND)
+            gl.glDepthMask(not kind.blend)
+            if kind.blend:
+                gl.glBlendFunc(*kind.blend)
+            layer.draw()
 
     def _read_main_framebuffer(self, scene: pyrender.Scene, flags: int) -> np.ndarray:
-        width, height = self._main_fb_dims
-        gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, self._main_fb_ms)
-        gl.glBindFramebuffer(gl.GL_DRAW_FRAMEBUFFER, self._main_fb)
-        gl.glBlitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.GL_COLOR_BUFFER_BIT, gl.GL_NEAREST)
-        gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, self._main_fb)
-        gl.glPixelStorei(gl.GL_PACK_ALIGNMENT, 1)
-        image = np.empty((height, width, 3), dtype=np.uint8)
-        gl.glReadPixels(0, 0, width, height, gl.GL_RGB, gl.GL_UNSIGNED_BYTE, image)
-        # OpenGL's first row is the lowest.
-        return np.ascontiguousarray(image[::-1])
+        width, height = self._size
+        if self._smooth:
+            self._smooth_edges()
+        else:
+            gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, self._drawn.framebuffer)
+            gl.glBindFramebuffer(gl.GL_DRAW_FRAMEBUFFER, self._final.framebuffer)
+            # Upside down, as OpenGL's first row is the lowest. At two samples a side this is an exact mean.
+            whole = 0, 0, self.viewport_width, self.viewport_height
+            gl.glBlitFramebuffer(*whole, 0, height, width, 0, gl.GL_COLOR_BUFFER_BIT, gl.GL_LINEAR)
+        gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, self._final.framebuffer)
+        gl.glPixelStorei(gl.GL_PACK_ALIGNMENT, 4)
+        # Four bytes a pixel as they are stored: OpenGL takes longer to leave one out than numpy.
+        image = np.empty((height, width, 4), dtype=np.uint8)
+        gl.glReadPixels(0, 0, width, height, gl.GL_RGBA, gl.GL_UNSIGNED_BYTE, image)
+        return np.ascontiguousarray(image[..., :3])
+
+    def _smooth_edges(self) -> None:
+        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, self._final.framebuffer)
+        gl.glViewport(0, 0, *self._size)
+        for switch in (gl.GL_DEPTH_TEST, gl.GL_BLEND, gl.GL_CULL_FACE):
+            gl.glDisable(switch)
+        gl.glActiveTexture(gl.GL_TEXTURE0)
+        gl.glBindTexture(gl.GL_TEXTURE_2D, self._drawn.colour)
+        self._use("whole", "smooth")
+        gl.glBindVertexArray(self._nothing)
+        gl.glDrawArrays(gl.GL_TRIANGLES, 0, 3)
+        gl.glBindVertexArray(0)
+
+
+class _Target:
+    """A frame buffer whose colours, 8 bits a channel, can be read as a texture."""
+
+    def __init__(self, width: int, height: int, depth: bool) -> None:
+        self.framebuffer = gl.glGenFramebuffers(1)
+        self.colour = gl.glGenTextures(1)
+        gl.glBindTexture(gl.GL_TEXTURE_2D, self.colour)
+        gl.glTexImage2D(
+            gl.GL_TEXTURE_2D, 0, gl.GL_RGBA8, width, height, 0, gl.GL_RGBA, gl.GL_UNSIGNED_BYTE, ctypes.c_void_p(0)
+        )
+        gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_MIN_FILTER, gl.GL_LINEAR)
+        gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_WRAP_S, gl.GL_CLAMP_TO_EDGE)
+        gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_WRAP_T, gl.GL_CLAMP_TO_EDGE)
+        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, self.framebuffer)
+        gl.glFramebufferTexture2D(
+            gl.GL_FRAMEBUFFER, gl.GL_COLOR_ATTACHMENT0, gl.GL_TEXTURE_2D, self.colour, 0
+        )
+        if depth:
+            buffer = gl.glGenRenderbuffers(1)
+            gl.glBindRenderbuffer(gl.GL_RENDERBUFFER, buffer)
+            gl.glRenderbufferStorage(gl.GL_RENDERBUFFER, gl.GL_DEPTH_COMPONENT24, width, height)
+            gl.glFramebufferRenderbuffer(gl.GL_FRAMEBUFFER, gl.GL_DEPTH_ATTACHMENT, gl.GL_RENDERBUFFER, buffer)
+        if gl.glCheckFramebufferStatus(gl.GL_FRAMEBUFFER) != gl.GL_FRAMEBUFFER_COMPLETE:
+            raise ValueError(f"no frame buffer of {width} x {height} pixels")
 
 
 class Canvas:
-    """An off-screen picture of the given layers, drawn in their order. Close it when done."""
+    """An off-screen picture of the given layers, drawn in their order. Close it when done.
 
-    def __init__(self, platform: Platform, size: tuple[int, int], layers: Sequence[Layer], background: np.ndarray):
+    ``samples``: squares a side that each pixel is the mean of, 1 or 2; ``smooth``: whether jagged edges of a picture
+    without such samples are found and smoothed; ``shadow_pixels``: width and height of the shadow map.
+    """
+
+    def __init__(
+        self,
+        platform: Platform,
+        size: tuple[int, int],
+        layers: Sequence[Layer],
+        background: np.ndarray,
+        *,
+        samples: int = 1,
+        smooth: bool = True,
+        shadow_pixels: tuple[int, int] = (1024, 1024),
+    ) -> None:
         self._scene = pyrender.Scene(bg_color=[*background, 1.0])
         self._scene.add(pyrender.Mesh(list(layers)))
-        self.shadow_pixels = round(_SHADOW_SHARE * size[1])
-        self._scene.add(_KeyLight(self.shadow_pixels))
+        self._scene.add(_KeyLight(shadow_pixels))
         # pyrender wants a camera; the one that counts comes with each picture, in the uniform block.
         self._scene.add(pyrender.PerspectiveCamera(yfov=1.0))
         try:
             self._context = _context(platform, size)
             self._context.init_context()
             self._context.make_current()
-            self._renderer = _Renderer(*size)
-            self.samples = self._sample_points()
+            self._renderer = _Renderer(size, samples, smooth)
         except (AssertionError, OpenGL.error.Error, OSError, ValueError) as error:
             reason = " ".join(str(error).split()) or type(error).__name__
             raise RenderError(f"OpenGL ({platform.renderer}) gives no picture of {size}: {reason}") from error
@@ -303,17 +333,6 @@ class Canvas:
     def close(self) -> None:
         """Give back the context and what it holds. Other canvases live on: the display is shared and stays."""
         self._context.delete_context()
-
-    def _sample_points(self) -> np.ndarray:
-        """Where a pixel's samples lie, from its centre [pixels], (4, 2)."""
-        self._renderer._configure_main_framebuffer()
-        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, self._renderer._main_fb_ms)
-        points = [gl.glGetMultisamplefv(gl.GL_SAMPLE_POSITION, i, np.zeros(2, np.float32)) for i in range(_SAMPLES)]
-        return np.array(points, dtype=np.float32) - 0.5
-
-
-def _layers(scene: pyrender.Scene) -> list[Layer]:
-    return [layer for mesh in scene.meshes for layer in mesh.primitives]
 
 
 def _context(platform: Platform, size: tuple[int, int]) -> Any:

@@ -1,8 +1,8 @@
 #include "common.glsl"
 #include "rotate.glsl"
 layout(location = 0) in vec3 corner;
-layout(location = 3) in vec4 centre_size;
-layout(location = 4) in vec4 turn;
+layout(location = 1) in vec4 centre_size;
+layout(location = 2) in vec4 turn;
 
 void main() {
     vec3 place = centre_size.xyz - eye.xyz + rotate(turn, corner * centre_size.w);

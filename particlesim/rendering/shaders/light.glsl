@@ -9,7 +9,7 @@ const vec3 GROUND = vec3(0.21, 0.20, 0.19);
 float lit(vec3 place) {
     // Before its surface by a little, or rounding would cast shadows.
     vec3 at = (shadow_from_eye * vec4(place, 1.0)).xyz - vec3(0.0, 0.0, 6e-4);
-    vec3 aside = vec3(0.6, -0.6, 0.0) * light.w;
+    vec3 aside = vec3(0.6, -0.6, 0.0) * texel.xyz;
     return 0.5 * (texture(shadow_map, at + aside) + texture(shadow_map, at - aside));
 }
 
