@@ -39,7 +39,7 @@ class Renderer:
         found = platform.choose()
         bridge = platform.open_bridge(found)
         self._scene = scene
-        self._size = scene.movie.resolution
+        self._size = scene.movie.size
         self._header = header
         self._first = first
         self._colours: ParticleColours | None = None
