@@ -78,7 +78,7 @@ def render(
                 yield image
                 _tell(progress, "rendering", summary.frames, total)
 
-        times = write_movie(path, images(), scene.movie.fps, scene.movie.resolution)
+        times = write_movie(path, images(), scene.movie.fps, scene.movie.size, scene.movie.crf)
         summary.seconds["encoding"] = times.encoding
         write_image(Path(path).with_suffix(".png"), poster[0])
     return summary

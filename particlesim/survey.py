@@ -33,7 +33,7 @@ def survey(scene: Scene) -> list[tuple[str, str]]:
         rows.append(
             (f"  {name}", f"{members.sum():,} x {shape.name}, size {span}, mass {c.mass[members].sum():.4g} kg")
         )
-    width, height = scene.movie.resolution
+    width, height = scene.movie.size
     pixels = 3 * width * height
     chosen = "given" if scene.solver.time_step != "auto" else "automatic, at the start"
     step = simulation.next_time_step()

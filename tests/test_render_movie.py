@@ -50,6 +50,16 @@ def test_same_images_give_the_same_bytes(tmp_path):
     assert not re.search(rb"x264 - core|Lav[cf][0-9]", (tmp_path / "a.mp4").read_bytes())
 
 
+def test_a_higher_rate_factor_makes_a_smaller_file(tmp_path):
+    rng = np.random.default_rng(1)
+    noise = list(rng.integers(0, 255, (5, SIZE[1], SIZE[0], 3), dtype=np.uint8))
+    sizes = []
+    for crf in (10, 18, 40):
+        write_movie(tmp_path / "a.mp4", noise, 30.0, SIZE, crf)
+        sizes.append((tmp_path / "a.mp4").stat().st_size)
+    assert sizes[0] > 1.2 * sizes[1] > 2.0 * sizes[2]
+
+
 @pytest.mark.parametrize("stop", [KeyboardInterrupt, ZeroDivisionError])
 def test_nothing_is_left_when_drawing_stops(tmp_path, stop):
     path = tmp_path / "a.mp4"

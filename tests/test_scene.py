@@ -136,6 +136,14 @@ def test_the_first_frame_is_at_zero_and_the_last_at_the_end():
     assert scene.frames == 61
 
 
+def test_the_quality_settles_the_resolution_unless_that_is_given():
+    table = {"world": {"size": [1, 1, 1]}, "particles": [{"shape": "sphere", "count": 0}]}
+    sizes = {quality: Scene(**table, movie={"quality": quality}).movie.size for quality in ("draft", "normal", "high")}
+    assert sizes == {"draft": (640, 360), "normal": (1280, 720), "high": (1920, 1080)}
+    assert Scene(**table).movie.size == (1280, 720)
+    assert Scene(**table, movie={"quality": "high", "resolution": [64, 128]}).movie.size == (64, 128)
+
+
 def test_assignments_are_checked():
     scene = ps.Scene(world={"size": [1, 1, 1]}, particles=[{"shape": "cube", "count": 1}])
     scene.solver.time_step = 0.5

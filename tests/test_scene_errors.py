@@ -63,7 +63,10 @@ BROKEN = [
         group(orientation="{ axis = [0, 0, 1], angel = 3 }"),
         "particles[0].orientation.angel = 3: unknown key; did you mean 'angle'?",
     ),
-    (GOOD + "[movie]\nframerate = 3\n", "movie.framerate = 3: unknown key; allowed: fps, resolution, background"),
+    (
+        GOOD + "[movie]\nframerate = 3\n",
+        "movie.framerate = 3: unknown key; allowed: fps, quality, resolution, background, crf",
+    ),
     (GROUP, "the key 'world' is missing"),
     (WORLD, "the key 'particles' is missing"),
     (group(shape=None), "particles[0]: the key 'shape' is missing"),
@@ -138,6 +141,12 @@ BROKEN = [
     ("title = 3\n" + GOOD, "title = 3: must be text in quotes"),
     (GOOD + "[movie]\nfps = 0\n", "movie.fps = 0: must be a number of frames a second from 1 to 240"),
     (GOOD + "[movie]\nresolution = [1281, 720]\n", f"movie.resolution = [1281, 720]: {PIXELS}"),
+    (
+        GOOD + '[movie]\nquality = "hihg"\n',
+        "movie.quality = \"hihg\": must be 'draft', 'normal' or 'high'; did you mean 'high'?",
+    ),
+    (GOOD + "[movie]\nquality = 1\n", "movie.quality = 1: must be 'draft', 'normal' or 'high'"),
+    (GOOD + "[movie]\ncrf = 52\n", "movie.crf = 52: must be a whole number from 0 (lossless) to 51 (smallest)"),
     (GOOD + "[solver]\ntime_step = 0\n", "solver.time_step = 0: must be 'auto' or a number of seconds above 0"),
     (
         GOOD + '[solver]\ntime_step = "fast"\n',

@@ -36,13 +36,16 @@ class MovieTimes:
     encoding: float
 
 
-def write_movie(path: str | Path, images: Iterable[np.ndarray], fps: float, size: tuple[int, int]) -> MovieTimes:
+def write_movie(
+    path: str | Path, images: Iterable[np.ndarray], fps: float, size: tuple[int, int], crf: int = 18
+) -> MovieTimes:
     """Encode images (height, width, 3) uint8 sRGB of ``size`` (width, height, both even) as H.264, yuv420p.
 
-    The same images give the same bytes. Whatever goes wrong, ``path`` is whole or untouched. RenderError if ffmpeg
-    fails or there is no image; ValueError for an image of another size; OSError for a path that cannot be written.
+    ``crf`` is x264's constant rate factor, 0 (lossless) to 51 (smallest file). The same images give the same bytes.
+    Whatever goes wrong, ``path`` is whole or untouched. RenderError if ffmpeg fails or there is no image; ValueError
+    for an image of another size; OSError for a path that cannot be written.
     """
-    with appearing(path) as hidden, _Encoder(hidden, fps, size) as encoder:
+    with appearing(path) as hidden, _Encoder(_command(hidden, fps, size, crf), size) as encoder:
         drawing, frames = 0.0, 0
         source = iter(images)
         while True:
@@ -74,12 +77,12 @@ def write_image(path: str | Path, image: np.ndarray) -> None:
 class _Encoder:
     """ffmpeg in a process of its own, fed by a thread, so that the next image is drawn while one is encoded."""
 
-    def __init__(self, path: Path, fps: float, size: tuple[int, int]) -> None:
+    def __init__(self, command: list[str], size: tuple[int, int]) -> None:
         self._size = size
         self._log = tempfile.TemporaryFile()  # noqa: SIM115  (closed in __exit__)
         # A session of its own: Ctrl-C is for us to handle, and ends ffmpeg from here.
         self._process = subprocess.Popen(
-            _command(path, fps, size), stdin=subprocess.PIPE, stdout=self._log, stderr=self._log, start_new_session=True
+            command, stdin=subprocess.PIPE, stdout=self._log, stderr=self._log, start_new_session=True
         )
         self._images: queue.Queue[np.ndarray | None] = queue.Queue(maxsize=_WAITING)
         self._broken = threading.Event()
@@ -139,13 +142,13 @@ class _Encoder:
         raise RenderError(f"ffmpeg failed with exit status {self._process.returncode}: {last}")
 
 
-def _command(path: Path, fps: float, size: tuple[int, int]) -> list[str]:
+def _command(path: Path, fps: float, size: tuple[int, int], crf: int) -> list[str]:
     rate = str(Fraction(fps).limit_denominator(1001))
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", rate, "-i", "-"]
     # Video players take untagged colours for those of old television; these say what they are.
     scale = "scale=out_color_matrix=bt709:out_range=tv:flags=bicubic+accurate_rnd+bitexact,format=yuv420p"
     tags = ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"]
-    codec = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "18", "-threads", str(_THREADS)]
+    codec = ["-c:v", "libx264", "-preset", "veryfast", "-crf", str(crf), "-threads", str(_THREADS)]
     # No versions, dates or settings in the file (unit type 6): the same images, the same bytes.
     bare = ["-fflags", "+bitexact", "-flags:v", "+bitexact", "-bsf:v", "filter_units=remove_types=6"]
     target = ["-movflags", "+faststart", "-f", "mp4", str(path)]

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from particlesim.scene.base import Colour, Finite, Flag, Model, Number, PlainFloat, Positive, Vector, shorthand, whole
-from particlesim.scene.wording import must_be
+from particlesim.scene.wording import must_be, one_of
 
 Elevation = Annotated[PlainFloat, Field(ge=-89, le=89), must_be("an angle from -89 to 89 degrees")]
 FieldOfView = Annotated[PlainFloat, Field(ge=2, le=149), must_be("an angle from 2 to 149 degrees")]
@@ -75,16 +75,30 @@ def _even(value: int) -> int:
 
 
 Pixels = Annotated[int, Field(ge=64, le=7680), whole, AfterValidator(_even)]
+Resolution = Annotated[
+    tuple[Pixels, Pixels], must_be("[width, height] in pixels, two even whole numbers from 64 to 7680")
+]
+Quality = Annotated[Literal["draft", "normal", "high"], one_of("draft", "normal", "high")]
+
+# Width and height of pictures that do not say theirs [pixels].
+_SIZES: dict[str, tuple[int, int]] = {"draft": (640, 360), "normal": (1280, 720), "high": (1920, 1080)}
 
 
 class Movie(Model):
     """The file that comes out."""
 
     fps: Annotated[PlainFloat, Field(ge=1, le=240), must_be("a number of frames a second from 1 to 240")] = 30.0
-    resolution: Annotated[
-        tuple[Pixels, Pixels], must_be("[width, height] in pixels, two even whole numbers from 64 to 7680")
-    ] = (1280, 720)
+    quality: Quality = "normal"
+    resolution: Resolution | None = None  # [width, height] in pixels; by the quality if not given
     background: Colour = "#f4f2ee"
+    crf: Annotated[int, Field(ge=0, le=51), whole, must_be("a whole number from 0 (lossless) to 51 (smallest)")] = (
+        18  # x264's constant rate factor: 6 more halve the file
+    )
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the pictures [pixels]."""
+        return self.resolution or _SIZES[self.quality]
 
 
 class Show(Model):

@@ -30,6 +30,19 @@ def must_be(what: str) -> WrapValidator:
     return WrapValidator(check)
 
 
+def one_of(*words: str) -> WrapValidator:
+    """Let a ``Literal`` of these words refuse others with a list of them, and the one that was probably meant."""
+
+    def check(value: Any, accept: Callable[[Any], Any]) -> Any:
+        try:
+            return accept(value)
+        except ValidationError:
+            meant = hint(value, words) if isinstance(value, str) else ""
+            raise ValueError(f"must be {listed(words)}{meant}") from None
+
+    return WrapValidator(check)
+
+
 def hint(word: str, allowed: Iterable[str]) -> str:
     """The allowed word that looks like ``word`` as a question, or nothing."""
     close = difflib.get_close_matches(word.lower(), list(allowed), n=1)
