@@ -43,12 +43,6 @@ def hull_mesh(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
     return np.array(rows, dtype=np.float32), np.array(triangles, dtype=np.uint32)
 
 
-def shadow_mesh(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
-    """A hull of size 1 with each corner once: places (v, 3), triangles (t, 3) uint32, seen from without."""
-    triangles = [(loop[0], a, b) for loop in shape.faces for a, b in zip(loop[1:-1], loop[2:], strict=True)]
-    return shape.vertices.astype(np.float32), np.array(triangles, dtype=np.uint32)
-
-
 def _edge_distances(outline: np.ndarray, normal: np.ndarray, edges: int) -> np.ndarray:
     """Distance of each corner (c, 3) from the first ``edges`` edges of its outline, (c, 4); no edge is far away."""
     distances = np.full((len(outline), 4), _NO_EDGE)

@@ -18,7 +18,7 @@ _ROOM = 1.04
 
 
 class Light(NamedTuple):
-    """A light from infinitely far. ``axes`` (3, 3): rows right, up and away from it; ``towards`` (3,): unit vector to it.
+    """A light from infinitely far. ``axes`` (3, 3): rows right, up and away from it; ``towards`` (3,): unit vector.
 
     Its shadow map shows half the ``reach`` (3,) [m] to each side of the world's middle along the axes, in ``pixels``.
     """
@@ -30,8 +30,8 @@ class Light(NamedTuple):
 
     @property
     def outlook(self) -> Outlook:
-        """The light as one who looks. A hull casts the shadow of its rear, as deep as its outer radius."""
-        return Outlook(self.axes, np.zeros(3), True, self.pixels[0] / (2.0 * self.reach[0]), self.pixels, slack=1.0)
+        """The light as one who looks."""
+        return Outlook(self.axes, np.zeros(3), True, self.pixels[0] / (2.0 * self.reach[0]), self.pixels)
 
     def matrix(self, eye: np.ndarray) -> np.ndarray:
         """From places seen from ``eye`` to coordinates and depth in the shadow map, all 0 .. 1; (4, 4)."""

@@ -8,12 +8,11 @@ import numpy as np
 
 
 class Outlook(NamedTuple):
-    """A picture, or the shadow map, as squares in which the nearest particles hide what is behind them.
+    """A picture, or the shadow map, as squares of which each shows what is nearest at its middle.
 
     ``axes`` (3, 3): rows right, up and away of the one who looks; ``eye`` (3,) [m], where that is, or any place if
     the view is ``parallel``; ``scale``: squares a metre, at distance 1 m if the view is not parallel; ``size``:
-    squares across and down, ``eye`` being in their middle; ``slack``: how far behind its middle a particle's rear may
-    show, in outer radii.
+    squares across and down, ``eye`` being in their middle.
     """
 
     axes: np.ndarray
@@ -21,7 +20,6 @@ class Outlook(NamedTuple):
     parallel: bool
     scale: float
     size: tuple[int, int]
-    slack: float = 0.0
 
 
 def nearest_first(outlook: Outlook, position: np.ndarray) -> np.ndarray:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,28 +11,22 @@ from particlesim.rendering import geometry, platform
 from particlesim.rendering.camera import View, view_at
 from particlesim.rendering.cells import cell_lines
 from particlesim.rendering.colour import ParticleColours, encoded
+from particlesim.rendering.ground import Ground
 from particlesim.rendering.lighting import key_light
-from particlesim.rendering.outlook import Outlook, nearest_first
+from particlesim.rendering.outlook import Outlook
 from particlesim.rendering.overlay import Readout
 from particlesim.rendering.quality import PRESETS
+from particlesim.rendering.sky import Sky
+from particlesim.rendering.smoothing import smooth_edges
+from particlesim.rendering.visibility import TILE, Bodies, look, renumber
 from particlesim.scene import Scene
-from particlesim.shapes import Shape
 from particlesim.trajectory import Frame, Header
-
-if TYPE_CHECKING:
-    from particlesim.rendering.sky import Sky
 
 # The floor fades out over this fraction of the world's longer horizontal side.
 _FLOOR_RIM = 0.45
 
 # How bright the floor is in the shadow, in sRGB.
 _FLOOR_SHADOW = 0.78
-
-# From this many particles on, finding the hidden ones costs less than drawing them.
-_MANY = 2000
-
-# Particles whose middle is at most so many of their radii above the floor shade it noticeably.
-_NEAR_FLOOR = 4.0
 
 # How pale the farthest corner of the world is: the share of the background in its colour.
 _HAZE = 0.22
@@ -61,27 +53,32 @@ class Renderer:
         # A shade off the background, so that the floor is seen, and a shadow on it even when that is black.
         self._floor = self._background * 0.97 + (0.06 if self._dark else 0.0)
         self._readout = Readout(self._size, self._dark) if scene.show.readout else None
-        self._inner = np.array([shape.inradius for shape in header.shapes])[header.shape] * header.size
-        self._outer = np.array([shape.radius for shape in header.shapes])[header.shape] * header.size
+        self._bodies = bodies = _bodies(header)
+        self._samples = quality.samples
         self._canvas_size = (quality.samples * self._size[0], quality.samples * self._size[1])
         self._light = key_light(scene, round(quality.shadow * self._size[1]))
-        self._sky = self._make_sky() if quality.sky else None
-        self._shown = [_shape_layer(bridge, shape) for shape in header.shapes]
-        self._casting = [_shadow_layer(bridge, shape) for shape in header.shapes]
-        self._contacts = bridge.Layer(bridge.CONTACT, geometry.SQUARE)
+        self._sky = Sky(np.asarray(scene.world.size), bodies.outer) if quality.sky else None
+        self._smooth = quality.smooth
+        self._bridge = bridge
+        corner = TILE * (0.5 + 0.5 * geometry.SQUARE)
+        self._spheres = bridge.Layer(bridge.SPHERES, corner)
+        hulls = {place: shape for place, shape in enumerate(header.shapes) if shape.kind != SPHERE}
+        self._hulls = {k: bridge.Layer(bridge.HULL, *geometry.hull_mesh(shape)) for k, shape in hulls.items()}
         self._lines = bridge.Layer(bridge.LINE, geometry.STRIP)
-        self._has_floor = scene.world.boundary[2] == "wall"
-        floor = [bridge.Layer(bridge.FLOOR, geometry.SQUARE), self._contacts] if self._has_floor else []
-        # Spheres come after hulls: their depth is computed, so they cannot be told hidden before they are shaded.
-        hulls_first = sorted(self._shown, key=lambda layer: layer.kind is bridge.SPHERE)
+        has_floor = scene.world.boundary[2] == "wall"
+        floor = [bridge.Layer(bridge.FLOOR, geometry.SQUARE)] if has_floor else []
+        size = np.asarray(scene.world.size)
+        self._rim = _FLOOR_RIM * float(max(size[:2]))
+        shaded = has_floor and quality.sky
+        self._ground = (
+            Ground(0.5 * size[:2] + self._rim, -0.5 * size[2], bodies.inner, bodies.outer) if shaded else None
+        )
         self._canvas = bridge.Canvas(
             found,
             self._size,
-            [*self._casting, *hulls_first, *floor, self._lines],
+            [self._spheres, *self._hulls.values(), *floor, self._lines],
             self._background,
-            samples=quality.samples,
-            smooth=quality.smooth,
-            shadow_pixels=self._light.pixels,
+            quality.samples,
         )
 
     def __enter__(self) -> Renderer:
@@ -105,71 +102,48 @@ class Renderer:
         if self._colours is None:
             self._colours = ParticleColours(self._scene, self._header, first)
         view = view_at(self._scene, frame.time, self._size[0] / self._size[1])
-        self._put_particles(frame, self._colours(frame), view)
-        self._put_shadows(frame)
+        owner, spheres = self._put_particles(frame, self._colours(frame), view)
         self._put_lines(view, cells)
-        image = self._canvas.draw(self._view_block(view))
+        ground = self._ground.light(frame.position) if self._ground is not None else np.ones((1, 1), dtype=np.float32)
+        shadow = self._shadow_map(frame)
+        image = self._canvas.draw(self._bridge.Picture(self._view_block(view), shadow, owner, spheres, ground))
+        image = smooth_edges(image) if self._smooth else np.ascontiguousarray(image[::-1, :, :3])
         if self._readout is not None:
             self._readout.draw(image, frame, first)
         return image
 
-    def _put_particles(self, frame: Frame, colours: np.ndarray, view: View) -> None:
+    def _put_particles(self, frame: Frame, colours: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray]:
+        """Hulls into their layers; of spheres, the number at each pixel, and their rows (see Picture)."""
         slope = float(np.tan(0.5 * view.field_of_view))
         axes = view.pose[:3, :3].T * np.array([[1.0], [1.0], [-1.0]])
         size = self._canvas_size
         outlook = Outlook(axes, view.pose[:3, 3], False, 0.5 * size[1] / slope, size)
-        members = self._chosen(outlook, frame)
-        paint = np.ones((len(members), 4), dtype=np.float32)
-        paint[:, :3] = colours[members]
-        if self._sky is not None:
-            paint[:, 3] = self._sky.light(frame.position, members)
-        for place, mine in self._by_shape(members):
-            self._shown[place].put(np.hstack([*self._poses(frame, members[mine], place), paint[mine]]))
+        sight = look(outlook, self._bodies, *self._places(frame))
+        for place, layer in self._hulls.items():
+            members = sight.hulls[self._header.shape[sight.hulls] == place]
+            pose = [frame.position[members], self._header.size[members, None], frame.orientation[members]]
+            layer.put(np.hstack([*pose, self._paint(frame, colours, members)]))
+        self._spheres.put(TILE * np.argwhere(sight.tiles)[:, ::-1])
+        members = renumber(sight.owner, len(frame.position))
+        place_radius = np.column_stack([frame.position[members], self._bodies.outer[members]])
+        return sight.owner, np.hstack([place_radius, self._paint(frame, colours, members)], dtype=np.float32)
 
-    def _put_shadows(self, frame: Frame) -> None:
-        """What the light meets, and, of what is close above the floor, what hides the sky from it."""
-        members = self._chosen(self._light.outlook, frame)
-        for place, mine in self._by_shape(members):
-            self._casting[place].put(np.hstack(self._poses(frame, members[mine], place)))
-        if self._has_floor and self._sky is not None:
-            height = frame.position[:, 2] + 0.5 * self._scene.world.size[2]
-            low = height < _NEAR_FLOOR * self._outer
-            # As much as a sphere between those within and about it.
-            radius = 0.5 * (self._inner[low] + self._outer[low])
-            self._contacts.put(np.column_stack([frame.position[low], radius]))
+    def _paint(self, frame: Frame, colours: np.ndarray, members: np.ndarray) -> np.ndarray:
+        """Linear colour, and share of the sky's light, of some particles, (k, 4) float64."""
+        light = self._sky.light(frame.position, members) if self._sky is not None else np.ones(len(members))
+        return np.column_stack([colours[members], light])
 
-    def _chosen(self, outlook: Outlook, frame: Frame) -> np.ndarray:
-        """The particles to draw, near ones first: what they hide is then not shaded."""
-        if len(frame.position) < _MANY:
-            return nearest_first(outlook, frame.position)
-        from particlesim.rendering.culling import in_sight  # noqa: PLC0415  (numba is slow to import)
+    def _shadow_map(self, frame: Frame) -> np.ndarray:
+        """How deep the key light goes into its box, (h, w) float32, 0 .. 1."""
+        close = look(self._light.outlook, self._bodies, *self._places(frame)).close
+        return np.clip(0.5 - (0.5 / np.float32(self._light.reach[2])) * close, 0.0, 1.0)
 
-        return in_sight(outlook, np.ascontiguousarray(frame.position), self._inner, self._outer)
-
-    def _make_sky(self) -> Sky:
-        from particlesim.rendering.sky import Sky  # noqa: PLC0415  (numba is slow to import)
-
-        return Sky(np.asarray(self._scene.world.size), self._outer)
-
-    def _by_shape(self, members: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-        """Of each shape its number, and which of ``members`` have it."""
-        if len(self._shown) == 1:
-            yield 0, np.ones(len(members), dtype=np.bool_)
-            return
-        shape = self._header.shape[members]
-        for place in range(len(self._shown)):
-            yield place, shape == place
-
-    def _poses(self, frame: Frame, members: np.ndarray, place: int) -> list[np.ndarray]:
-        """Columns that say where particles of one shape are: place and radius, or place and size, and quaternion."""
-        size = self._header.size[members, None]
-        if self._header.shapes[place].kind == SPHERE:
-            return [np.hstack([frame.position[members], 0.5 * size], dtype=np.float32, casting="same_kind")]
-        columns = [frame.position[members], size, frame.orientation[members]]
-        return [np.hstack(columns, dtype=np.float32, casting="same_kind")]
+    @staticmethod
+    def _places(frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+        return np.ascontiguousarray(frame.position), np.ascontiguousarray(frame.orientation)
 
     def _put_lines(self, view: View, cells: tuple[np.ndarray, np.ndarray, np.ndarray] | None) -> None:
-        width = max(1.0, self._size[1] / 720.0)
+        width = self._samples * max(1.0, self._size[1] / 720.0)
         rows = [np.zeros((0, 11), dtype=np.float32)]
         if cells is not None:
             rows.append(cell_lines(*cells, width=0.8 * width))
@@ -196,7 +170,6 @@ class Renderer:
         turn = np.eye(4)
         turn[:3, :3] = view.pose[:3, :3].T
         size = np.asarray(self._scene.world.size)
-        rim = _FLOOR_RIM * max(size[0], size[1])
         # Haze grows through the world, from its nearest corner to its farthest.
         depth = float(np.abs(back) @ size)
         vectors = [
@@ -208,20 +181,28 @@ class Renderer:
             (*(_FLOOR_SHADOW * self._floor), 1.0),
             (width, height, 1.0, -view.near),
             (*-back, 2.0 * slope / height),
-            (0.5 * size[0], 0.5 * size[1], -0.5 * size[2], rim),
+            (*view.pose[:3, 0], 0.0),
+            (*view.pose[:3, 1], 0.0),
+            (slope * width / height, slope, 0.0, 0.0),
+            (0.5 * size[0], 0.5 * size[1], -0.5 * size[2], self._rim),
             (float(back @ eye) - 0.5 * depth, 1.0 / depth, _HAZE, 0.0),
         ]
         matrices = [(projection @ turn).T.ravel(), self._light.matrix(eye).T.ravel()]  # by columns, as OpenGL has them
         return np.concatenate([*matrices, np.ravel(vectors)], dtype=np.float32, casting="same_kind")
 
 
-def _shape_layer(bridge: Any, shape: Shape) -> Any:
-    if shape.kind == SPHERE:
-        return bridge.Layer(bridge.SPHERE, geometry.SQUARE)
-    return bridge.Layer(bridge.HULL, *geometry.hull_mesh(shape))
-
-
-def _shadow_layer(bridge: Any, shape: Shape) -> Any:
-    if shape.kind == SPHERE:
-        return bridge.Layer(bridge.SPHERE_SHADOW, geometry.SQUARE)
-    return bridge.Layer(bridge.HULL_SHADOW, *geometry.shadow_mesh(shape))
+def _bodies(header: Header) -> Bodies:
+    shapes, shape = header.shapes, header.shape
+    planes = [
+        [(*normal, normal @ hull.vertices[loop[0]]) for normal, loop in zip(hull.face_normals, hull.faces, strict=True)]
+        for hull in shapes
+    ]
+    faces = np.array([len(of_one) for of_one in planes], dtype=np.int64)
+    return Bodies(
+        inner=np.array([hull.inradius for hull in shapes])[shape] * header.size,
+        outer=np.array([hull.radius for hull in shapes])[shape] * header.size,
+        size=np.ascontiguousarray(header.size, dtype=np.float64),
+        start=(np.cumsum(faces) - faces)[shape],
+        faces=faces[shape],
+        planes=np.array([plane for of_one in planes for plane in of_one], dtype=np.float64).reshape(-1, 4),
+    )

@@ -1,6 +1,6 @@
-#version 400 core
+#version 420 core
 // What every shader shares. All positions in shaders are relative to the eye, along the axes of the world.
-layout(std140) uniform View {
+layout(std140, binding = 0) uniform View {
     mat4 clip_from_eye;
     mat4 shadow_from_eye;  // to texture coordinates and depth of the shadow map, all 0 .. 1
     vec4 eye;              // xyz [m]
@@ -11,6 +11,9 @@ layout(std140) uniform View {
     vec4 floor_dark;
     vec4 viewport;         // width, height [pixels]; depth is z + w / distance
     vec4 forward;          // xyz: unit vector the camera looks along; w: height of one pixel at distance 1
+    vec4 right;            // xyz: unit vectors to the right and upwards in the picture
+    vec4 up;
+    vec4 slopes;           // tangents of half the field of view across and up
     vec4 floor_area;       // half width x, y [m], height z [m], width of the fading rim [m]
     vec4 haze;             // distance where it begins [m], 1 / distance over which it grows [1/m], strength at its end
 };
