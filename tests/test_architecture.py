@@ -18,7 +18,7 @@ FLOORS = [
     ["insertion", "placement", "launch", "build"],
     ["simulation", "rendering"],
     ["compare"],
-    ["summary", "pipeline", "progress", "survey", "diagnosis", "bench", "cli", "__main__", "__init__"],
+    ["summary", "pipeline", "progress", "survey", "diagnosis", "bench", "commands", "cli", "__main__", "__init__"],
 ]
 FLOOR = {name: level for level, names in enumerate(FLOORS) for name in names}
 SOURCES = sorted(PACKAGE.rglob("*.py"))
