@@ -217,7 +217,16 @@ def test_the_schema_accepts_what_scene_files_say(schema, everything):
         (("solver", "broad_phase"), ["octree", "grid", "naive", {"kind": "grid", "cells": 4}], ["tree", 4]),
         (("solver", "time_step"), ["auto", 0.1], ["fast", 0, -1]),
         (("particles", 0, "count"), [0, 5], [-1, "5", True, 2.5]),
-        (("camera",), ["orbit", "fixed", {"kind": "look-at", "position": [1, 2, 3]}], ["look-at", 1]),
+        (
+            ("camera",),
+            [
+                "orbit",
+                {"kind": "fixed", "zoom": 2},
+                {"kind": "look-at", "position": [1, 2, 3]},
+                {"kind": "path", "keys": [{"time": 0, "position": [1, 2, 3]}]},
+            ],
+            ["look-at", 1, "path", {"kind": "path", "keys": [{"time": 0}]}],
+        ),
     ],
     ids=lambda value: ".".join(map(str, value)) if isinstance(value, tuple) else None,
 )

@@ -37,6 +37,10 @@ def _lines(keys):
     return "".join(f"{key} = {value}\n" for key, value in keys.items() if value is not None)
 
 
+def path_of(*keys):
+    return GOOD + f'[camera]\nkind = "path"\nkeys = [{", ".join(keys)}]\n'
+
+
 BROKEN = [
     ("", "the file is empty"),
     ("[world\n", "not valid TOML: Expected ']' at the end of a table declaration (at line 1, column 7)"),
@@ -162,6 +166,24 @@ BROKEN = [
     ),
     (GOOD + '[camera]\nkind = "look-at"\nposition = [0, 0, 0]\n', "camera: position and target must differ"),
     (GOOD + '[camera]\nkind = "orbit"\nperiod = 0\n', "camera.period = 0: must be a number of seconds, not 0"),
+    (
+        GOOD + '[camera]\nkind = "fixed"\nsubject = "wold"\n',
+        "camera.subject = \"wold\": must be 'auto', 'world' or 'particles'; did you mean 'world'?",
+    ),
+    (GOOD + '[camera]\nkind = "orbit"\nzoom = 0\n', "camera.zoom = 0: must be a number above 0"),
+    (GOOD + '[camera]\nkind = "fixed"\nzoom = 2\ndistance = 3\n', "camera: give zoom or distance, not both"),
+    (GOOD + '[camera]\nkind = "path"\n', "camera: the key 'keys' is missing"),
+    (GOOD + '[camera]\nkind = "path"\nkeys = []\n', "camera.keys = []: must not be empty"),
+    (path_of("{ time = 0 }"), "camera.keys[0]: the key 'position' is missing"),
+    (
+        path_of("{ time = 0, positoin = [1, 2, 3] }"),
+        "camera.keys[0].positoin = [1, 2, 3]: unknown key; did you mean 'position'?",
+    ),
+    (path_of("{ time = 0, position = [0, 0, 0] }"), "camera.keys[0]: position and target must differ"),
+    (
+        path_of("{ time = 1, position = [1, 0, 0] }", "{ time = 1, position = [1, 0, 0] }"),
+        "camera.keys: times must grow from key to key, but 1 follows 1",
+    ),
     (GOOD + "[show]\nbox = 1\n", "show.box = 1: must be true or false"),
     # What fits.
     (

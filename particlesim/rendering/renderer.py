@@ -8,7 +8,7 @@ import numpy as np
 
 from particlesim.constants import SPHERE
 from particlesim.rendering import geometry, platform
-from particlesim.rendering.camera import View, light_azimuth, view_at
+from particlesim.rendering.camera import Box, View, light_azimuth, subject_box, view_at
 from particlesim.rendering.cells import cell_lines
 from particlesim.rendering.colour import ParticleColours, encoded
 from particlesim.rendering.overlay import Readout
@@ -43,6 +43,7 @@ class Renderer:
         self._header = header
         self._first = first
         self._colours: ParticleColours | None = None
+        self._subject: Box | None = None
         self._background = encoded(scene.movie.background)
         self._dark = bool(self._background.mean() < 0.5)
         # A shade off the background, so that the floor is seen, and a shadow on it even when that is black.
@@ -83,7 +84,8 @@ class Renderer:
         self._first = first = self._first or frame
         if self._colours is None:
             self._colours = ParticleColours(self._scene, self._header, first)
-        view = view_at(self._scene, frame.time, self._size[0] / self._size[1])
+            self._subject = subject_box(self._scene, self._header, first)
+        view = view_at(self._scene, frame.time, self._size[0] / self._size[1], self._subject)
         self._put_particles(frame, self._colours(frame), view)
         self._put_lines(view, cells)
         image = self._canvas.draw(self._view_block(view))
@@ -125,7 +127,7 @@ class Renderer:
         rows = [np.zeros((0, 11), dtype=np.float32)]
         if cells is not None:
             rows.append(cell_lines(*cells, width=0.8 * width))
-        if self._scene.show.box:
+        if self._scene.box_shown:
             upper = 0.5 * np.asarray(self._scene.world.size)
             start, end = (ends[0] for ends in geometry.box_edges(-upper[None], upper[None]))
             colour = np.full((12, 4), 0.75 if self._dark else 0.25)

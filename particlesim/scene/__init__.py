@@ -42,6 +42,12 @@ class Scene(Model):
         return sum(group.number for group in self.particles)
 
     @property
+    def box_shown(self) -> bool:
+        """Whether the edges of the world are drawn."""
+        nothing_there = all(boundary == "open" for boundary in self.world.boundary)
+        return self.show.box if self.show.box is not None else not nothing_there
+
+    @property
     def frames(self) -> int:
         """How many frames the movie has, the first at time zero."""
         return int(self.duration * self.movie.fps + 1e-9) + 1

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import itertools
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -13,28 +14,52 @@ Elevation = Annotated[PlainFloat, Field(ge=-89, le=89), must_be("an angle from -
 FieldOfView = Annotated[PlainFloat, Field(ge=2, le=149), must_be("an angle from 2 to 149 degrees")]
 
 
-class FixedCamera(Model):
-    """Stands still in the given direction, as near as shows the whole world."""
+# What a camera fits into the picture: along axes with walls or a period the world, along open ones the particles; or
+# either of them along all axes.
+Subject = Annotated[Literal["auto", "world", "particles"], one_of("auto", "world", "particles")]
 
-    kind: Literal["fixed"]
+
+class _Aimed(Model):
+    """A camera in a given direction, as near as shows all of its subject, unless its distance is given."""
+
     azimuth: Finite = 30.0  # [degrees] about z, from +x
     elevation: Elevation = 20.0  # [degrees] above the horizon
     field_of_view: FieldOfView = 40.0  # [degrees], vertical
-
-
-class LookAtCamera(Model):
-    """Stands at ``position`` and looks at ``target`` [m]."""
-
-    kind: Literal["look-at"]
-    position: Vector
-    target: Vector = (0.0, 0.0, 0.0)
-    field_of_view: FieldOfView = 40.0
+    subject: Subject = "auto"
+    zoom: Positive = 1.0  # how much larger than fitting
+    distance: Positive | None = None  # [m]
 
     @model_validator(mode="after")
-    def _apart(self) -> LookAtCamera:
+    def _either(self) -> Self:
+        if self.distance is not None and self.zoom != 1.0:
+            raise ValueError("give zoom or distance, not both")
+        return self
+
+
+class FixedCamera(_Aimed):
+    """Stands still; a given distance is that from the middle of its subject."""
+
+    kind: Literal["fixed"]
+
+
+class _Placed(Model):
+    """A camera at ``position`` that looks at ``target`` [m]."""
+
+    position: Vector
+    target: Vector = (0.0, 0.0, 0.0)
+    field_of_view: FieldOfView = 40.0  # [degrees], vertical
+
+    @model_validator(mode="after")
+    def _apart(self) -> Self:
         if self.position == self.target:
             raise ValueError("position and target must differ")
         return self
+
+
+class LookAtCamera(_Placed):
+    """Stands at ``position`` and looks at ``target`` [m]."""
+
+    kind: Literal["look-at"]
 
 
 def _not_zero(value: float) -> float:
@@ -43,21 +68,37 @@ def _not_zero(value: float) -> float:
     return value
 
 
-class OrbitCamera(Model):
-    """Circles the target once in ``period`` seconds; the distance is chosen to fit the world if not given."""
+class OrbitCamera(_Aimed):
+    """Circles the target once in ``period`` seconds, starting at the azimuth."""
 
     kind: Literal["orbit"]
     period: Annotated[Number, AfterValidator(_not_zero), must_be("a number of seconds, not 0")] = (
         20.0  # [s]; negative turns the other way
     )
-    azimuth: Finite = 30.0  # [degrees] at the start
-    elevation: Elevation = 20.0
-    distance: Positive | None = None  # [m]
-    target: Vector = (0.0, 0.0, 0.0)
-    field_of_view: FieldOfView = 40.0
+    target: Vector | None = None  # [m]; the middle of its subject if not given
 
 
-_Cameras = Annotated[FixedCamera | LookAtCamera | OrbitCamera, Field(discriminator="kind")]
+class CameraKey(_Placed):
+    """Where a camera is at one time."""
+
+    time: Finite  # [s]
+
+
+def _in_time(keys: list[CameraKey]) -> list[CameraKey]:
+    for before, after in itertools.pairwise(keys):
+        if after.time <= before.time:
+            raise ValueError(f"times must grow from key to key, but {after.time:g} follows {before.time:g}")
+    return keys
+
+
+class PathCamera(Model):
+    """Moves smoothly from key to key, at rest before the first and after the last."""
+
+    kind: Literal["path"]
+    keys: Annotated[list[CameraKey], Field(min_length=1), AfterValidator(_in_time)]
+
+
+_Cameras = Annotated[FixedCamera | LookAtCamera | OrbitCamera | PathCamera, Field(discriminator="kind")]
 Camera = Annotated[
     _Cameras,
     shorthand(
@@ -104,6 +145,6 @@ class Movie(Model):
 class Show(Model):
     """What is drawn besides the particles."""
 
-    box: Flag = True  # edges of the world
+    box: Flag | None = None  # edges of the world; if not given, unless all axes are open
     cells: Flag = False  # leaves of the octree
     readout: Flag = True  # time, particles, impacts, energy
