@@ -14,7 +14,7 @@ FLOORS = [
     ["state"],
     ["broad_phase", "narrow_phase", "motion"],
     ["impacts"],
-    ["trajectory", "ledger", "scene"],
+    ["trajectory", "ledger", "scene", "extents"],
     ["insertion", "placement", "launch", "build"],
     ["simulation", "rendering"],
     ["compare"],

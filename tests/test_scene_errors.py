@@ -15,7 +15,12 @@ COUNT = "must be a whole number from 0 to 100,000,000"
 SIZE = 'must be a number above 0, or a table such as { kind = "uniform", low = 0.1, high = 0.2 }'
 BOUNDARY = "must be 'wall', 'periodic' or 'open', or a list of 3 of them"
 TURN = "[w, x, y, z] (a quaternion), or { axis = [x, y, z], angle = degrees }"
-COLOUR = "must be 'by_shape', 'by_group', 'by_speed', a colour name such as 'steelblue', or '#rrggbb'"
+COLOUR = "must be 'by_shape', 'by_group', 'by_speed', 'by_height', 'by_size', a colour name such as 'steelblue', or '#rrggbb'"
+ROWS = (
+    "must be true, false or a list of 'time', 'particles', 'impacts', 'energy change', 'temperature', 'pressure', "
+    "'speed', 'pairs tested' or 'broad phases'"
+)
+RANGE = "must be [low, high], two numbers, low below high"
 PIXELS = "must be [width, height] in pixels, two even whole numbers from 64 to 7680"
 
 
@@ -183,6 +188,19 @@ BROKEN = [
     (
         path_of("{ time = 1, position = [1, 0, 0] }", "{ time = 1, position = [1, 0, 0] }"),
         "camera.keys: times must grow from key to key, but 1 follows 1",
+    ),
+    (GOOD + "[show]\nreadout = 1\n", f"show.readout = 1: {ROWS}"),
+    (GOOD + '[show]\nreadout = ["tme"]\n', f"show.readout = [\"tme\"]: {ROWS}; did you mean 'time'?"),
+    (GOOD + '[show]\nlegend = "on"\n', 'show.legend = "on": must be true or false'),
+    (group(colour='"by_speed"', colour_range="[1, 1]"), f"particles[0].colour_range = [1, 1]: {RANGE}"),
+    (group(colour='"by_speed"', colour_range="3"), f"particles[0].colour_range = 3: {RANGE}"),
+    (
+        group(colour_range="[0, 1]"),
+        "particles[0]: colour_range goes with the colours 'by_speed', 'by_height' or 'by_size'",
+    ),
+    (
+        group(colour='"by_size"', colour_range="[0, 1]") + GROUP + 'colour = "by_size"\ncolour_range = [0, 2]\n',
+        "particles[1] has another colour_range for by_size than a group before it",
     ),
     (GOOD + "[show]\nbox = 1\n", "show.box = 1: must be true or false"),
     # What fits.

@@ -11,7 +11,7 @@ from particlesim.rendering import geometry, platform
 from particlesim.rendering.camera import Box, View, light_azimuth, subject_box, view_at
 from particlesim.rendering.cells import cell_lines
 from particlesim.rendering.colour import ParticleColours, encoded
-from particlesim.rendering.overlay import Readout
+from particlesim.rendering.overlay import Overlay
 from particlesim.scene import Scene
 from particlesim.trajectory import Frame, Header
 
@@ -44,11 +44,11 @@ class Renderer:
         self._first = first
         self._colours: ParticleColours | None = None
         self._subject: Box | None = None
+        self._overlay: Overlay | None = None
         self._background = encoded(scene.movie.background)
         self._dark = bool(self._background.mean() < 0.5)
         # A shade off the background, so that the floor is seen, and a shadow on it even when that is black.
         self._floor = self._background * 0.97 + (0.06 if self._dark else 0.0)
-        self._readout = Readout(self._size, self._dark) if scene.show.readout else None
         self._inner = np.array([shape.inradius for shape in header.shapes])[header.shape] * header.size
         self._outer = np.array([shape.radius for shape in header.shapes])[header.shape] * header.size
         self._particles = [
@@ -85,12 +85,13 @@ class Renderer:
         if self._colours is None:
             self._colours = ParticleColours(self._scene, self._header, first)
             self._subject = subject_box(self._scene, self._header, first)
+            self._overlay = Overlay(self._scene, self._header, first, self._colours, self._dark)
         view = view_at(self._scene, frame.time, self._size[0] / self._size[1], self._subject)
         self._put_particles(frame, self._colours(frame), view)
         self._put_lines(view, cells)
         image = self._canvas.draw(self._view_block(view))
-        if self._readout is not None:
-            self._readout.draw(image, frame, first)
+        if self._overlay is not None:
+            self._overlay.draw(image, frame)
         return image
 
     def _put_particles(self, frame: Frame, colours: np.ndarray, view: View) -> None:

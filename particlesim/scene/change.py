@@ -25,7 +25,10 @@ def with_movie(scene: Scene, **values: Any) -> Scene:
 
 def with_colour(scene: Scene, colour: str) -> Scene:
     """The scene with all particles coloured like this. SceneError if it is no colour."""
-    groups = [{**group.model_dump(mode="json"), "colour": colour} for group in scene.particles]
+    groups = [group.model_dump(mode="json") for group in scene.particles]
+    for group in groups:
+        # A range is one of the field that it was given for.
+        group.update(colour=colour, colour_range=group["colour_range"] if group["colour"] == colour else None)
     return replaced(scene, particles=groups)
 
 
@@ -38,7 +41,7 @@ def with_look(scene: Scene, other: Scene) -> Scene:
         there, here = len(other.particles), len(scene.particles)
         raise SceneError(f"has {there} groups of particles, but {here} are to be drawn", "particles")
     groups = [
-        own.model_copy(update={"colour": look.colour})
+        own.model_copy(update={"colour": look.colour, "colour_range": look.colour_range})
         for own, look in zip(scene.particles, other.particles, strict=True)
     ]
     return scene.model_copy(update={"particles": groups, **{key: getattr(other, key) for key in _LOOK}})

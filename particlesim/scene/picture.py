@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from particlesim.scene.base import Colour, Finite, Flag, Model, Number, PlainFloat, Positive, Vector, shorthand, whole
-from particlesim.scene.wording import must_be, one_of
+from particlesim.scene.wording import hint, listed, must_be, one_of
 
 Elevation = Annotated[PlainFloat, Field(ge=-89, le=89), must_be("an angle from -89 to 89 degrees")]
 FieldOfView = Annotated[PlainFloat, Field(ge=2, le=149), must_be("an angle from 2 to 149 degrees")]
@@ -142,9 +142,40 @@ class Movie(Model):
         return self.resolution or _SIZES[self.quality]
 
 
+_Row = Literal[
+    "time", "particles", "impacts", "energy change",
+    "temperature", "pressure", "speed", "pairs tested", "broad phases",
+]  # fmt: skip
+_ROWS = get_args(_Row)
+_USUAL_ROWS = _ROWS[:4]
+
+
+def _readout(value: Any) -> Any:
+    """True, false or a list of rows. ValueError that names a word that is none."""
+    if isinstance(value, bool):
+        return value
+    what = f"must be true, false or a list of {listed(_ROWS)}"
+    if not isinstance(value, list | tuple):
+        raise ValueError(what)
+    for word in value:
+        if word not in _ROWS:
+            raise ValueError(what + (hint(word, _ROWS) if isinstance(word, str) else ""))
+    return list(value)
+
+
 class Show(Model):
     """What is drawn besides the particles."""
 
     box: Flag | None = None  # edges of the world; if not given, unless all axes are open
     cells: Flag = False  # leaves of the octree
-    readout: Flag = True  # time, particles, impacts, energy
+    readout: Annotated[bool | list[str], BeforeValidator(_readout, json_schema_input_type=bool | list[_Row])] = (
+        True  # which rows; true stands for time, particles, impacts and energy change
+    )
+    legend: Flag | None = None  # scales of fields and names of colours; the scales alone if not given
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """The rows of the readout."""
+        if isinstance(self.readout, bool):
+            return _USUAL_ROWS if self.readout else ()
+        return tuple(self.readout)
