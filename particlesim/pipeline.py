@@ -15,6 +15,8 @@ import numpy as np
 from particlesim.jit import CACHE_FOLDER
 from particlesim.rendering import Renderer, write_image, write_movie
 from particlesim.rendering.cells import octree_cells
+from particlesim.rendering.colour import encoded
+from particlesim.rendering.fade import faded, strength
 from particlesim.scene import Scene
 from particlesim.scene.file import parse_scene
 from particlesim.simulation import Simulation
@@ -68,6 +70,7 @@ def render(
         summary = _summary(scene, reel.header)
         watch = _Stopwatch(summary)
         renderer = stack.enter_context(Renderer(scene, reel.header, reel.first))
+        background = encoded(scene.movie.background)
         poster: list[np.ndarray] = []
 
         def images() -> Iterator[np.ndarray]:
@@ -78,8 +81,9 @@ def render(
                     # A third of the way in, things have begun to happen.
                     if summary.drawn == len(wanted) // 3:
                         poster.append(image)
+                    seen = strength(summary.drawn, len(wanted), scene.movie.fade * scene.movie.fps)
                     summary.drawn += 1
-                    yield image
+                    yield faded(image, seen, background)
                 summary.add(frame)
                 _tell(progress, "rendering", summary.frames, reel.total)
 

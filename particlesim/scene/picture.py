@@ -7,7 +7,19 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from particlesim.scene.base import Colour, Finite, Flag, Model, Number, PlainFloat, Positive, Vector, shorthand, whole
+from particlesim.scene.base import (
+    Colour,
+    Finite,
+    Flag,
+    Model,
+    NotNegative,
+    Number,
+    PlainFloat,
+    Positive,
+    Vector,
+    shorthand,
+    whole,
+)
 from particlesim.scene.wording import hint, listed, must_be, one_of
 
 Elevation = Annotated[PlainFloat, Field(ge=-89, le=89), must_be("an angle from -89 to 89 degrees")]
@@ -135,6 +147,8 @@ class Movie(Model):
     crf: Annotated[int, Field(ge=0, le=51), whole, must_be("a whole number from 0 (lossless) to 51 (smallest)")] = (
         18  # x264's constant rate factor: 6 more halve the file
     )
+
+    fade: Annotated[NotNegative, must_be("a number of seconds of 0 or more")] = 0.0  # [s] at the start and at the end
 
     @property
     def size(self) -> tuple[int, int]:
