@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-import bisect
-import json
 import time as clock
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
-from particlesim.jit import CACHE_FOLDER
+from particlesim.reel import Progress, Reel, frames_of, opened, reel_of, reel_until, start, tell
 from particlesim.rendering import Renderer, write_image, write_movie
 from particlesim.rendering.cells import octree_cells
 from particlesim.rendering.colour import encoded
 from particlesim.rendering.fade import faded, strength
 from particlesim.scene import Scene
-from particlesim.scene.file import parse_scene
-from particlesim.simulation import Simulation
 from particlesim.summary import Summary
 from particlesim.trajectory import Frame, Header, Trajectory, TrajectoryWriter
-
-# Called with what is going on, how many frames are done, and how many there will be.
-Progress = Callable[[str, int, int], None]
 
 _T = TypeVar("_T")
 
@@ -36,14 +29,14 @@ def simulate(
 
     SceneError if the scene cannot be built, SimulationError if it runs away, OSError if the file cannot be written.
     """
-    simulation = _start(scene, threads, progress)
+    simulation = start(scene, threads, progress)
     summary = _summary(scene, simulation.header)
     watch = _Stopwatch(summary)
     with TrajectoryWriter(path, simulation.header) as writer:
-        for _, frame in watch.timed("simulating", _frames(simulation, scene.frames)):
+        for _, frame in watch.timed("simulating", frames_of(simulation, scene.frames)):
             writer.append(frame)
             summary.add(frame)
-            _tell(progress, "simulating", summary.frames, scene.frames)
+            tell(progress, "simulating", summary.frames, scene.frames)
     return summary
 
 
@@ -62,35 +55,14 @@ def render(
     all if not given: a scene is simulated from its start to the last of them. Errors as for ``simulate``; RenderError
     if this machine cannot draw or encode.
     """
-    with ExitStack() as stack:
-        source = _opened(source, stack)
-        scene = look or (scene_of(source) if isinstance(source, Trajectory) else source)
-        wanted = frames or range(len(source) if isinstance(source, Trajectory) else source.frames)
-        reel = _reel(source, wanted, threads, progress)
-        summary = _summary(scene, reel.header)
-        watch = _Stopwatch(summary)
-        renderer = stack.enter_context(Renderer(scene, reel.header, reel.first))
-        background = encoded(scene.movie.background)
-        poster: list[np.ndarray] = []
-
-        def images() -> Iterator[np.ndarray]:
-            for number, frame in watch.timed(reel.phase, reel.frames):
-                if number in wanted:
-                    with watch.running("drawing"):
-                        image = _drawn(scene, reel.header, renderer, frame)
-                    # A third of the way in, things have begun to happen.
-                    if summary.drawn == len(wanted) // 3:
-                        poster.append(image)
-                    seen = strength(summary.drawn, len(wanted), scene.movie.fade * scene.movie.fps)
-                    summary.drawn += 1
-                    yield faded(image, seen, background)
-                summary.add(frame)
-                _tell(progress, "rendering", summary.frames, reel.total)
-
-        times = write_movie(path, images(), scene.movie.fps, scene.movie.size, scene.movie.crf)
-        summary.seconds["encoding"] = times.encoding
-        write_image(Path(path).with_suffix(".png"), poster[0])
-    return summary
+    with opened(source) as movable:
+        reel = reel_of(movable, frames, threads, progress)
+        scene = look or reel.scene
+        with _Studio(reel, scene, progress) as studio:
+            times = write_movie(path, studio.images(), scene.movie.fps, scene.movie.size, scene.movie.crf)
+            studio.summary.seconds["encoding"] = times.encoding
+            write_image(Path(path).with_suffix(".png"), studio.poster)
+    return studio.summary
 
 
 def still(
@@ -106,120 +78,61 @@ def still(
 
     Otherwise like ``render``.
     """
-    with ExitStack() as stack:
-        source = _opened(source, stack)
-        scene = look or (scene_of(source) if isinstance(source, Trajectory) else source)
-        if isinstance(source, Trajectory):
-            nearest = _nearest(source, time)
-            reel = _reel(source, range(nearest, nearest + 1), threads, progress)
-        else:
-            reel = _simulated_until(time, source, threads, progress)
-        summary = _summary(scene, reel.header)
+    with opened(source) as movable:
+        reel = reel_until(time, movable, threads, progress)
+        with _Studio(reel, look or reel.scene, progress) as studio:
+            for _ in studio.images():
+                pass
+            write_image(path, studio.poster)
+    return studio.summary
+
+
+class _Studio:
+    """Where pictures are taken of a reel, ``scene`` saying how. A context manager: it holds a Renderer.
+
+    ``summary``: what the frames that have passed amount to. RenderError if this machine cannot draw.
+    """
+
+    def __init__(self, reel: Reel, scene: Scene, progress: Progress | None) -> None:
+        self._reel, self._scene, self._progress = reel, scene, progress
+        self._renderer = Renderer(scene, reel.header, reel.first)
+        self.summary = _summary(scene, reel.header)
+        self.poster = np.zeros((0, 0, 3), dtype=np.uint8)  # of the movie that images() gives
+
+    def __enter__(self) -> _Studio:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._renderer.close()
+
+    def images(self) -> Iterator[np.ndarray]:
+        """The pictures of the movie, (h, w, 3) uint8, with its fades; all frames are taken into account on the way."""
+        reel, movie, summary = self._reel, self._scene.movie, self.summary
         watch = _Stopwatch(summary)
-        renderer = stack.enter_context(Renderer(scene, reel.header, reel.first))
-        for _, frame in watch.timed(reel.phase, reel.frames):
+        background, count = encoded(movie.background), len(reel.wanted)
+        for number, frame in watch.timed(reel.phase, reel.frames):
+            if number in reel.wanted:
+                with watch.running("drawing"):
+                    image = self._picture(frame)
+                # A third of the way in, things have begun to happen.
+                if summary.drawn == count // 3:
+                    self.poster = image
+                seen = strength(summary.drawn, count, movie.fade * movie.fps)
+                summary.drawn += 1
+                yield faded(image, seen, background)
             summary.add(frame)
-            _tell(progress, reel.phase, summary.frames, reel.total)
-        with watch.running("drawing"):
-            image = _drawn(scene, reel.header, renderer, frame)
-        write_image(path, image)
-        summary.drawn = 1
-    return summary
+            tell(self._progress, "rendering", summary.frames, reel.total)
 
-
-def scene_of(trajectory: Trajectory) -> Scene:
-    """The scene that a trajectory is of. SceneError if this version cannot read it."""
-    return parse_scene(json.loads(trajectory.header.scene_json))
-
-
-class _Reel(NamedTuple):
-    """What passes before the camera."""
-
-    header: Header
-    first: Frame  # of the whole run: what scales and changes refer to
-    frames: Iterator[tuple[int, Frame]]  # with their numbers, all that are simulated or read
-    total: int  # how many there are of them
-    phase: str  # what takes the time until the next
-
-
-def _opened(source: Scene | Trajectory | str | Path, stack: ExitStack) -> Scene | Trajectory:
-    return stack.enter_context(Trajectory(source)) if isinstance(source, str | Path) else source
-
-
-def _reel(source: Scene | Trajectory, wanted: range, threads: int | None, progress: Progress | None) -> _Reel:
-    """All frames of a scene up to the last wanted one; of a trajectory those alone."""
-    if isinstance(source, Trajectory):
-        stored = ((k, source[k]) for k in wanted)
-        return _Reel(source.header, source[0], stored, len(wanted), "reading")
-    simulation = _start(source, threads, progress)
-    total = max(wanted) + 1
-    return _Reel(simulation.header, simulation.frame(), _frames(simulation, total), total, "simulating")
-
-
-def _simulated_until(time: float, scene: Scene, threads: int | None, progress: Progress | None) -> _Reel:
-    """The frames of a scene up to ``time`` [s], and last the particles at that very time."""
-    simulation = _start(scene, threads, progress)
-    before = int(time * scene.movie.fps) + 1
-
-    def frames() -> Iterator[tuple[int, Frame]]:
-        yield from _frames(simulation, before)
-        simulation.run_until(time)
-        yield before, simulation.frame()
-
-    return _Reel(simulation.header, simulation.frame(), frames(), before + 1, "simulating")
-
-
-def _nearest(trajectory: Trajectory, time: float) -> int:
-    """The frame whose time is nearest to ``time`` [s]."""
-    after = bisect.bisect_left(range(len(trajectory) - 1), time, key=trajectory.time)
-    return min(range(max(after - 1, 0), after + 1), key=lambda k: abs(trajectory.time(k) - time))
-
-
-def _drawn(scene: Scene, header: Header, renderer: Renderer, frame: Frame) -> np.ndarray:
-    """The picture of a frame, with the octree's cells if they are shown."""
-    return renderer.draw(frame, octree_cells(scene, header, frame) if scene.show.cells else None)
-
-
-def _start(scene: Scene, threads: int | None, progress: Progress | None) -> Simulation:
-    if not any(Path(CACHE_FOLDER).rglob("*.nbi")):
-        _tell(progress, "compiling, this once", 0, scene.frames)
-        _compile(scene)
-    _tell(progress, "preparing", 0, scene.frames)
-    return Simulation(scene, threads=threads)
-
-
-def _compile(scene: Scene) -> None:
-    """Run two cubes into each other, so that the kernels a scene needs are compiled before its clock runs."""
-    at, towards = [0.3, 0.3, 0.3], [-1.0, -1.0, -1.0]
-    poses = [{"position": [-1.0, -1.0, -1.0]}, {"position": at, "velocity": towards}]
-    table = {
-        "world": {"size": [4.0, 4.0, 4.0]},
-        "solver": scene.solver,
-        "particles": [
-            {"shape": "cube", "placement": {"kind": "list", "poses": poses}},
-            {"shape": "sphere", "count": 1},
-        ],
-    }
-    Simulation(Scene.model_validate(table)).run(duration=0.5)
-
-
-def _frames(simulation: Simulation, total: int) -> Iterator[tuple[int, Frame]]:
-    """The first frames of a scene and their numbers: at time zero and at every tick of its movie."""
-    yield 0, simulation.frame()
-    for k in range(1, total):
-        simulation.run_until(k / simulation.scene.movie.fps)
-        yield k, simulation.frame()
+    def _picture(self, frame: Frame) -> np.ndarray:
+        """A frame as it looks, with the octree's cells if they are shown."""
+        cells = octree_cells(self._scene, self._reel.header, frame) if self._scene.show.cells else None
+        return self._renderer.draw(frame, cells)
 
 
 def _summary(scene: Scene, header: Header) -> Summary:
     restitutions = [scene.world.restitution, *(group.restitution for group in scene.particles)]
     elastic = all(restitution in (None, 1.0) for restitution in restitutions)
     return Summary(float(header.mass.sum()), scene.world.gravity, elastic)
-
-
-def _tell(progress: Progress | None, phase: str, done: int, total: int) -> None:
-    if progress is not None:
-        progress(phase, done, total)
 
 
 class _Stopwatch:

@@ -86,7 +86,7 @@ def _opened(source: Path, wishes: Wishes) -> Iterator[tuple[Scene | Trajectory, 
         scene = wished_scene(load(source), wishes, of_trajectory=False)
         yield scene, scene, scene.frames
         return
-    from particlesim.pipeline import scene_of  # noqa: PLC0415
+    from particlesim.reel import scene_of  # noqa: PLC0415
     from particlesim.trajectory import Trajectory  # noqa: PLC0415
 
     with Trajectory(source) as trajectory:
