@@ -47,6 +47,7 @@ _HOMES = {
     "render": "pipeline",
     "separation": "narrow_phase",
     "simulate": "pipeline",
+    "still": "pipeline",
 }
 
 __all__ = [
@@ -67,6 +68,7 @@ __all__ = [
     "render",
     "separation",
     "simulate",
+    "still",
 ]
 
 

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+import time as clock
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
-from particlesim.jit import CACHE_FOLDER
+from particlesim.reel import Progress, Reel, frames_of, opened, reel_of, reel_until, start, tell
 from particlesim.rendering import Renderer, write_image, write_movie
 from particlesim.rendering.cells import octree_cells
+from particlesim.rendering.colour import encoded
+from particlesim.rendering.fade import faded, strength
 from particlesim.scene import Scene
-from particlesim.simulation import Simulation
 from particlesim.summary import Summary
 from particlesim.trajectory import Frame, Header, Trajectory, TrajectoryWriter
 
-# Called with what is going on, how many frames are done, and how many there will be.
-Progress = Callable[[str, int, int], None]
+_T = TypeVar("_T")
 
 
 def simulate(
@@ -28,14 +29,14 @@ def simulate(
 
     SceneError if the scene cannot be built, SimulationError if it runs away, OSError if the file cannot be written.
     """
-    simulation = _start(scene, threads, progress)
+    simulation = start(scene, threads, progress)
     summary = _summary(scene, simulation.header)
     watch = _Stopwatch(summary)
     with TrajectoryWriter(path, simulation.header) as writer:
-        for frame in watch.timed("simulating", _frames(simulation)):
+        for _, frame in watch.timed("simulating", frames_of(simulation, scene.frames)):
             writer.append(frame)
             summary.add(frame)
-            _tell(progress, "simulating", summary.frames, scene.frames)
+            tell(progress, "simulating", summary.frames, scene.frames)
     return summary
 
 
@@ -43,91 +44,95 @@ def render(
     source: Scene | Trajectory | str | Path,
     path: str | Path,
     *,
+    look: Scene | None = None,
+    frames: range | None = None,
     progress: Progress | None = None,
     threads: int | None = None,
 ) -> Summary:
     """Make a movie (MP4) of a scene, simulating it, or of a trajectory, as it was; and a poster (PNG) beside it.
 
-    Errors as for ``simulate``; RenderError if this machine cannot draw or encode.
+    ``look`` draws a trajectory as this scene says, in place of its own; ``frames`` are the numbers of those to draw,
+    all if not given: a scene is simulated from its start to the last of them. Errors as for ``simulate``; RenderError
+    if this machine cannot draw or encode.
     """
-    with ExitStack() as stack:
-        if isinstance(source, str | Path):
-            source = stack.enter_context(Trajectory(source))
-        if isinstance(source, Trajectory):
-            scene, header, total = _scene_of(source), source.header, len(source)
-            frames: Iterable[Frame] = source
-        else:
-            simulation = _start(source, threads, progress)
-            scene, header, total = source, simulation.header, source.frames
-            frames = _frames(simulation)
-        summary = _summary(scene, header)
+    with opened(source) as movable:
+        reel = reel_of(movable, frames, threads, progress)
+        scene = look or reel.scene
+        with _Studio(reel, scene, progress) as studio:
+            times = write_movie(path, studio.images(), scene.movie.fps, scene.movie.size, scene.movie.crf)
+            studio.summary.seconds["encoding"] = times.encoding
+            write_image(Path(path).with_suffix(".png"), studio.poster)
+    return studio.summary
+
+
+def still(
+    source: Scene | Trajectory | str | Path,
+    path: str | Path,
+    time: float,
+    *,
+    look: Scene | None = None,
+    progress: Progress | None = None,
+    threads: int | None = None,
+) -> Summary:
+    """Make one picture (PNG): of a scene at ``time`` [s], simulating it until then, or of a trajectory's nearest frame.
+
+    Otherwise like ``render``.
+    """
+    with opened(source) as movable:
+        reel = reel_until(time, movable, threads, progress)
+        with _Studio(reel, look or reel.scene, progress) as studio:
+            for _ in studio.images():
+                pass
+            write_image(path, studio.poster)
+    return studio.summary
+
+
+class _Studio:
+    """Where pictures are taken of a reel, ``scene`` saying how. A context manager: it holds a Renderer.
+
+    ``summary``: what the frames that have passed amount to. RenderError if this machine cannot draw.
+    """
+
+    def __init__(self, reel: Reel, scene: Scene, progress: Progress | None) -> None:
+        self._reel, self._scene, self._progress = reel, scene, progress
+        self._renderer = Renderer(scene, reel.header, reel.first)
+        self.summary = _summary(scene, reel.header)
+        self.poster = np.zeros((0, 0, 3), dtype=np.uint8)  # of the movie that images() gives
+
+    def __enter__(self) -> _Studio:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._renderer.close()
+
+    def images(self) -> Iterator[np.ndarray]:
+        """The pictures of the movie, (h, w, 3) uint8, with its fades; all frames are taken into account on the way."""
+        reel, movie, summary = self._reel, self._scene.movie, self.summary
         watch = _Stopwatch(summary)
-        phase = "reading" if isinstance(source, Trajectory) else "simulating"
-        renderer = stack.enter_context(Renderer(scene, header))
-        poster: list[np.ndarray] = []
-
-        def images() -> Iterator[np.ndarray]:
-            for frame in watch.timed(phase, frames):
+        background, count = encoded(movie.background), len(reel.wanted)
+        for number, frame in watch.timed(reel.phase, reel.frames):
+            if number in reel.wanted:
                 with watch.running("drawing"):
-                    cells = octree_cells(scene, header, frame) if scene.show.cells else None
-                    image = renderer.draw(frame, cells)
+                    image = self._picture(frame)
                 # A third of the way in, things have begun to happen.
-                if summary.frames == total // 3:
-                    poster.append(image)
-                summary.add(frame)
-                yield image
-                _tell(progress, "rendering", summary.frames, total)
+                if summary.drawn == count // 3:
+                    self.poster = image
+                seen = strength(summary.drawn, count, movie.fade * movie.fps)
+                summary.drawn += 1
+                yield faded(image, seen, background)
+            summary.add(frame)
+            tell(self._progress, "rendering", summary.frames, reel.total)
 
-        times = write_movie(path, images(), scene.movie.fps, scene.movie.size, scene.movie.crf)
-        summary.seconds["encoding"] = times.encoding
-        write_image(Path(path).with_suffix(".png"), poster[0])
-    return summary
-
-
-def _start(scene: Scene, threads: int | None, progress: Progress | None) -> Simulation:
-    if not any(Path(CACHE_FOLDER).rglob("*.nbi")):
-        _tell(progress, "compiling, this once", 0, scene.frames)
-        _compile(scene)
-    _tell(progress, "preparing", 0, scene.frames)
-    return Simulation(scene, threads=threads)
-
-
-def _compile(scene: Scene) -> None:
-    """Run two cubes into each other, so that the kernels a scene needs are compiled before its clock runs."""
-    at, towards = [0.3, 0.3, 0.3], [-1.0, -1.0, -1.0]
-    poses = [{"position": [-1.0, -1.0, -1.0]}, {"position": at, "velocity": towards}]
-    table = {
-        "world": {"size": [4.0, 4.0, 4.0]},
-        "solver": scene.solver,
-        "particles": [
-            {"shape": "cube", "placement": {"kind": "list", "poses": poses}},
-            {"shape": "sphere", "count": 1},
-        ],
-    }
-    Simulation(Scene.model_validate(table)).run(duration=0.5)
-
-
-def _frames(simulation: Simulation) -> Iterator[Frame]:
-    """The frames of a scene: at time zero and at every tick of its movie."""
-    yield simulation.frame()
-    for k in range(1, simulation.scene.frames):
-        simulation.run_until(k / simulation.scene.movie.fps)
-        yield simulation.frame()
-
-
-def _scene_of(trajectory: Trajectory) -> Scene:
-    return Scene.model_validate_json(trajectory.header.scene_json)
+    def _picture(self, frame: Frame) -> np.ndarray:
+        """A frame as it looks, with the octree's cells if they are shown."""
+        cells = octree_cells(self._scene, self._reel.header, frame) if self._scene.show.cells else None
+        return self._renderer.draw(frame, cells)
 
 
 def _summary(scene: Scene, header: Header) -> Summary:
     restitutions = [scene.world.restitution, *(group.restitution for group in scene.particles)]
     elastic = all(restitution in (None, 1.0) for restitution in restitutions)
     return Summary(float(header.mass.sum()), scene.world.gravity, elastic)
-
-
-def _tell(progress: Progress | None, phase: str, done: int, total: int) -> None:
-    if progress is not None:
-        progress(phase, done, total)
 
 
 class _Stopwatch:
@@ -139,16 +144,16 @@ class _Stopwatch:
     @contextmanager
     def running(self, name: str) -> Iterator[None]:
         """Count how long the ``with`` block takes."""
-        start = time.perf_counter()
+        start = clock.perf_counter()
         yield
-        self._seconds[name] = self._seconds.get(name, 0.0) + time.perf_counter() - start
+        self._seconds[name] = self._seconds.get(name, 0.0) + clock.perf_counter() - start
 
-    def timed(self, name: str, frames: Iterable[Frame]) -> Iterator[Frame]:
-        """Pass frames on and count how long each was in coming."""
-        source = iter(frames)
+    def timed(self, name: str, passing: Iterable[_T]) -> Iterator[_T]:
+        """Pass things on and count how long each was in coming."""
+        source = iter(passing)
         while True:
             with self.running(name):
-                frame = next(source, None)
-            if frame is None:
+                thing = next(source, None)
+            if thing is None:
                 return
-            yield frame
+            yield thing

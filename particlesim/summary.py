@@ -25,6 +25,7 @@ class Summary:
         self._largest_kinetic = self._largest_change = self._largest_gain = 0.0
         self._least = math.inf
         self.frames = 0
+        self.drawn = 0  # how many of the frames there are pictures of
         self.largest_overlap = 0.0
         self.seconds: dict[str, float] = {}
 

@@ -149,6 +149,10 @@ class Trajectory:
     def __iter__(self) -> Iterator[Frame]:
         return (self[k] for k in range(len(self)))
 
+    def time(self, k: int) -> float:
+        """The time of frame ``k`` [s]."""
+        return float(self._file[k].log[_LOG + "time"][0])
+
     def __getitem__(self, k: int) -> Frame:
         """Frame ``k``, 0 the first; positions and motion as the file stores them, in single precision."""
         stored = self._file[k]

@@ -14,11 +14,23 @@ FLOORS = [
     ["state"],
     ["broad_phase", "narrow_phase", "motion"],
     ["impacts"],
-    ["trajectory", "ledger", "scene"],
+    ["trajectory", "ledger", "scene", "extents"],
     ["insertion", "placement", "launch", "build"],
     ["simulation", "rendering"],
     ["compare"],
-    ["summary", "pipeline", "progress", "survey", "diagnosis", "bench", "cli", "__main__", "__init__"],
+    [
+        "reel",
+        "summary",
+        "pipeline",
+        "progress",
+        "survey",
+        "diagnosis",
+        "bench",
+        "commands",
+        "cli",
+        "__main__",
+        "__init__",
+    ],
 ]
 FLOOR = {name: level for level, names in enumerate(FLOORS) for name in names}
 SOURCES = sorted(PACKAGE.rglob("*.py"))

@@ -10,11 +10,12 @@ from typer.testing import CliRunner
 from particlesim import Simulation, cli
 from particlesim.broad_phase import METHODS
 from particlesim.compare import compare_frames, compare_scene, sweep
-from particlesim.compare.boxes import frame_boxes, make_boxes
+from particlesim.compare.boxes import make_boxes
 from particlesim.compare.measure import Found, Measured, digest, duration, measure_by_turns, peak_memory
 from particlesim.compare.peers import peer_search, peers
 from particlesim.compare.stream import Stream, StreamError, read_stream, write_stream
 from particlesim.compare.sweep import Sweep, SweepError, sizes_up_to
+from particlesim.extents import frame_boxes
 from tests.worlds import gas, listed, scene
 
 SCENE = """

@@ -67,6 +67,18 @@ def test_the_same_scene_gives_the_same_bytes(tmp_path):
     assert (tmp_path / "one.mp4").read_bytes() == (tmp_path / "two.mp4").read_bytes()
 
 
+def test_a_movie_fades_but_its_poster_does_not(tmp_path):
+    settings = {**SMALL, "movie": {**SMALL["movie"], "fade": 0.2, "background": "white"}, "show": {"readout": False}}
+    ps.render(gas(5, **settings), tmp_path / "movie.mp4")
+    movie = np.array(list(iio.imiter(tmp_path / "movie.mp4", plugin="FFMPEG"))).astype(float)
+    darkness = (255.0 - movie).mean(axis=(1, 2, 3))
+    # Frames 2 and 3 of 0 to 5 are seen as they are, those beside them by half.
+    assert darkness[0] < 0.5 and darkness[5] < 0.5
+    assert darkness[1] == pytest.approx(0.5 * darkness[2], rel=0.1)
+    assert darkness[4] == pytest.approx(0.5 * darkness[3], rel=0.1)
+    assert np.abs(255.0 - iio.imread(tmp_path / "movie.png")).mean() == pytest.approx(darkness[2], rel=0.1)
+
+
 def test_the_summary_adds_up(tmp_path):
     summary = ps.simulate(gas(5, gravity=(0, 0, -3), **SMALL), tmp_path / "run.gsd")
     assert summary.frames == 6

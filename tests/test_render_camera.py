@@ -3,10 +3,22 @@
 import numpy as np
 import pytest
 
-from particlesim.rendering.camera import FILL, light_azimuth, view_at
+from particlesim.rendering.camera import FILL, Box, light_azimuth, subject_box, view_at
 from particlesim.scene import Scene
+from particlesim.shapes import sphere
+from particlesim.trajectory import Frame, Header
 
 SPHERES = [{"shape": "sphere", "count": 1}]
+
+PATH = {
+    "kind": "path",
+    "keys": [
+        {"time": 0.5, "position": (9.0, 0.0, 3.0), "field_of_view": 40.0},
+        {"time": 2.0, "position": (0.0, 8.0, 1.0), "target": (0.0, 1.0, 0.0), "field_of_view": 20.0},
+        {"time": 3.0, "position": (0.0, 8.0, 1.0), "target": (0.0, 1.0, 0.0), "field_of_view": 20.0},
+        {"time": 6.0, "position": (-5.0, 0.0, 2.0), "target": (0.0, 1.0, 0.0), "field_of_view": 30.0},
+    ],
+}
 
 
 def scene(camera, size=(10.0, 8.0, 6.0)):
@@ -73,7 +85,7 @@ def test_look_at_puts_its_target_in_the_middle(position):
 
 @pytest.mark.parametrize(
     "camera",
-    [{"kind": "fixed"}, {"kind": "orbit"}, {"kind": "look-at", "position": (3.0, 2.0, 1.0)}],
+    [{"kind": "fixed"}, {"kind": "orbit"}, {"kind": "look-at", "position": (3.0, 2.0, 1.0)}, PATH],
 )
 def test_poses_are_rotations_with_the_horizon_level(camera):
     axes = view_at(scene(camera), 1.0, 1.0).pose[:3, :3]
@@ -81,6 +93,99 @@ def test_poses_are_rotations_with_the_horizon_level(camera):
     assert np.linalg.det(axes) == pytest.approx(1.0)
     assert axes[2, 0] == pytest.approx(0.0, abs=1e-12)
     assert axes[2, 1] > 0.0
+
+
+def test_a_path_goes_through_its_keys_and_holds_before_and_after():
+    on_path = scene(PATH)
+    for key in PATH["keys"]:
+        view = view_at(on_path, key["time"], 1.5)
+        assert view.pose[:3, 3] == pytest.approx(key["position"], abs=1e-12)
+        assert np.degrees(view.field_of_view) == pytest.approx(key["field_of_view"])
+        place, _ = project(view, 1.5, [key.get("target", (0.0, 0.0, 0.0))])
+        assert place[0] == pytest.approx([0.0, 0.0], abs=1e-12)
+    for time, held in ((-1.0, 0.5), (0.0, 0.5), (2.5, 2.0), (99.0, 6.0)):
+        assert view_at(on_path, time, 1.5).pose == pytest.approx(view_at(on_path, held, 1.5).pose, abs=1e-12)
+
+
+def test_a_path_is_smooth_starts_and_ends_at_rest_and_does_not_swing_beyond_its_keys():
+    times = np.linspace(0.0, 7.0, 7001)
+    place = np.array([view_at(scene(PATH), time, 1.5).pose[:3, 3] for time in times])
+    speed = np.diff(place, axis=0) / 1e-3
+    # A corner would change the speed at once, by metres a second.
+    assert np.abs(np.diff(speed, axis=0)).max() < 0.05
+    assert np.abs(speed[[501, 5998]]).max() < 0.05 and np.abs(speed).max() > 1.0
+    keys = np.array([key["position"] for key in PATH["keys"]])
+    assert np.all(place >= keys.min(axis=0) - 1e-12) and np.all(place <= keys.max(axis=0) + 1e-12)
+
+
+def test_a_path_of_one_key_stands_still():
+    one = scene({"kind": "path", "keys": PATH["keys"][:1]})
+    same = scene({"kind": "look-at", "position": (9.0, 0.0, 3.0)})
+    assert view_at(one, 5.0, 1.5).pose == pytest.approx(view_at(same, 0.0, 1.5).pose)
+    assert light_azimuth(one) == light_azimuth(same)
+
+
+def header(size):
+    count = len(size)
+    return Header("", (sphere(),), *(np.zeros(count, int), np.asarray(size)), np.zeros(count, int), None, None)
+
+
+def frame(position, velocity=None):
+    position = np.asarray(position, dtype=float)
+    velocity = np.zeros_like(position) if velocity is None else np.asarray(velocity, dtype=float)
+    return Frame(0.0, position, None, velocity, None, None, {})
+
+
+def open_scene(camera="fixed", boundary="open", **settings):
+    world = {"size": (100.0, 100.0, 100.0), "boundary": boundary}
+    return Scene(world=world, particles=SPHERES, camera=camera, duration=2.0, **settings)
+
+
+def test_an_open_world_is_framed_by_where_its_particles_start_and_fly():
+    start = frame([(10.0, 0.0, 0.0), (12.0, 3.0, 1.0)], [(0.0, 0.0, 2.0), (1e9, 0.0, 0.0)])
+    box = subject_box(open_scene(), header([2.0, 1.0]), start)
+    assert box.lower == pytest.approx([9.0, -1.0, -1.0])
+    # As far as the world goes, however fast something leaves it.
+    assert box.upper == pytest.approx([50.0, 3.5, 5.0])
+    far = frame([(500.0, 0.0, 0.0)], [(1.0, 0.0, 0.0)])
+    assert subject_box(open_scene(), header([2.0]), far).upper == pytest.approx([501.0, 1.0, 1.0])
+
+
+def test_walls_are_framed_and_open_axes_by_their_particles_unless_told_otherwise():
+    start = frame([(10.0, 0.0, 0.0)])
+    boxes = [
+        subject_box(
+            open_scene({"kind": "orbit", "subject": subject}, ("wall", "periodic", "open")), header([2.0]), start
+        )
+        for subject in ("auto", "world", "particles")
+    ]
+    assert [box.upper.tolist() for box in boxes] == [[50.0, 50.0, 1.0], [50.0, 50.0, 50.0], [11.0, 1.0, 1.0]]
+    assert subject_box(open_scene(), header([]), frame(np.zeros((0, 3)))) is not None
+    assert subject_box(scene(PATH), header([2.0]), start).upper == pytest.approx([5.0, 4.0, 3.0])
+
+
+@pytest.mark.parametrize("kind", ["fixed", "orbit"])
+def test_what_is_framed_fills_the_picture(kind):
+    some = open_scene(kind)
+    box = subject_box(some, header([2.0, 1.0]), frame([(10.0, 0.0, 0.0), (12.0, 3.0, 1.0)]))
+    view = view_at(some, 0.0, 1.5, box)
+    place, away = project(view, 1.5, box.corners)
+    assert 0.7 * FILL < np.abs(place).max() <= FILL + 1e-9
+    assert np.all(away > view.near)
+
+
+def test_zoom_makes_what_is_framed_larger_and_a_distance_is_kept():
+    sizes = []
+    for zoom in (0.5, 1.0, 2.0):
+        view = view_at(scene({"kind": "fixed", "zoom": zoom}, (0.1, 0.1, 0.1)), 0.0, 1.5)
+        sizes.append(np.ptp(project(view, 1.5, corners((0.1, 0.1, 0.1)))[0], axis=0).max())
+    assert sizes == pytest.approx([FILL, 2.0 * FILL, 4.0 * FILL], rel=1e-6)
+    view = view_at(scene({"kind": "fixed", "distance": 30.0}), 0.0, 1.5)
+    assert np.linalg.norm(view.pose[:3, 3]) == pytest.approx(30.0)
+    box = Box(np.array([1.0, 1.0, 1.0]), np.array([3.0, 3.0, 3.0]))
+    for camera in ({"kind": "fixed", "distance": 9.0}, {"kind": "orbit", "distance": 9.0}):
+        view = view_at(scene(camera), 0.0, 1.5, box)
+        assert np.linalg.norm(view.pose[:3, 3] - 2.0) == pytest.approx(9.0)
 
 
 def test_light_comes_over_the_left_shoulder():

@@ -1,4 +1,4 @@
-"""Colours by shape, group, speed and name; what overlays and cells are made of."""
+"""Colours by shape, group, field and name; what hulls and cells are drawn from."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from particlesim import shapes
 from particlesim.rendering import geometry
 from particlesim.rendering.cells import cell_lines
 from particlesim.rendering.colour import PALETTE, ParticleColours, map_colours, parse, shape_colours
-from particlesim.rendering.overlay import Readout, energy_change, readout_rows
+from particlesim.rendering.fields import field_of, figures
 from particlesim.scene import Scene
 from particlesim.trajectory import Frame, Header
 
@@ -27,9 +27,14 @@ def frame(velocity, time=0.0, **ledger):
     return Frame(time, zero, turn, velocity, zero, zero.astype(int), ledger)
 
 
-def scene(*colours, gravity=(0.0, 0.0, 0.0)):
-    groups = [{"shape": "sphere", "count": 1, "colour": colour} for colour in colours]
-    return Scene(world={"size": (1.0, 1.0, 1.0), "gravity": gravity}, particles=groups)
+def scene(*colours, gravity=(0.0, 0.0, 0.0), boundary="wall", span=None):
+    groups = [{"shape": "sphere", "count": 1, "colour": colour, "colour_range": span} for colour in colours]
+    world = {"size": (1.0, 1.0, 4.0), "gravity": gravity, "boundary": boundary}
+    return Scene(world=world, particles=groups)
+
+
+def of_all(colours, frame):
+    return colours(frame, np.arange(len(frame.position)))
 
 
 def test_each_shape_keeps_its_colour_whatever_else_is_there():
@@ -48,7 +53,7 @@ def test_more_shapes_than_colours_still_have_one_each():
 def test_groups_and_names():
     some = scene("by_group", "by_group", "#804020", "steelblue")
     colours = ParticleColours(some, header(["sphere"], [0] * 5, [0, 1, 2, 3, 0]), frame(np.zeros((5, 3))))
-    rgb = colours(frame(np.zeros((5, 3))))
+    rgb = of_all(colours, frame(np.zeros((5, 3))))
     assert rgb.dtype == np.float32
     assert rgb[0] == pytest.approx(parse(PALETTE[0])) and np.array_equal(rgb[0], rgb[4])
     assert rgb[1] == pytest.approx(parse(PALETTE[1]))
@@ -60,8 +65,8 @@ def test_speed_colours_grow_lighter_and_their_scale_stays():
     moving = scene("by_speed", "red")
     first = frame([[1.0, 0, 0], [0, 0, 0], [0, 1.0, 0]])
     colours = ParticleColours(moving, header(["sphere"], [0, 0, 0], [0, 1, 0]), first)
-    before = colours(first).copy()
-    faster = colours(frame([[2.0, 0, 0], [9.0, 0, 0], [0, 1.0, 0]])).copy()
+    before = of_all(colours, first).copy()
+    faster = of_all(colours, frame([[2.0, 0, 0], [9.0, 0, 0], [0, 1.0, 0]])).copy()
     assert faster[0].sum() > before[0].sum()
     assert np.array_equal(before[2], faster[2])
     assert np.array_equal(before[1], faster[1])
@@ -73,58 +78,65 @@ def test_speed_colours_of_particles_that_start_at_rest():
     rest = frame(np.zeros((1, 3)))
     for gravity in ((0.0, 0.0, 0.0), (0.0, 0.0, -9.81)):
         colours = ParticleColours(scene("by_speed", gravity=gravity), header(["sphere"], [0]), rest)
-        still = colours(rest).copy()
+        still = of_all(colours, rest).copy()
         assert np.all(np.isfinite(still))
-        assert not np.array_equal(still, colours(frame([[0.5, 0.0, 0.0]])))
+        assert not np.array_equal(still, of_all(colours, frame([[0.5, 0.0, 0.0]])))
 
 
-def test_readout_says_what_the_ledger_knows():
-    first = frame(np.zeros((1234, 3)), kinetic_translational=3.0, kinetic_rotational=1.0)
-    later = frame(
-        np.zeros((1234, 3)), 1.5, kinetic_translational=1.0, kinetic_rotational=1.0, potential=1.9, impacts=12345.0
-    )
-    assert readout_rows(later, first) == [
-        ("time", "1.50 s"),
-        ("particles", "1,234"),
-        ("impacts", "12,345"),
-        ("energy change", "-2.5 %"),
-    ]
-    assert [name for name, _ in readout_rows(frame(np.zeros((1, 3))), first)] == ["time", "particles"]
-    assert readout_rows(first, first)[-1] == ("energy change", "0")
+def test_each_field_colours_its_own_groups():
+    mixed = scene("by_height", "by_size", "#804020")
+    head = header(["sphere"], [0] * 5, [0, 0, 1, 1, 2])
+    head.size[:] = 1.0, 1.0, 2.0, 3.0, 4.0
+    start = frame(np.zeros((5, 3)))
+    start.position[:, 2] = -2.0, 2.0, 0.0, 0.0, 0.0
+    colours = ParticleColours(mixed, head, start)
+    assert [field.name for field in colours.fields] == ["height", "size"]
+    rgb = np.sqrt(of_all(colours, start))
+    assert rgb[:2] == pytest.approx(map_colours(np.array([0.0, 1.0])), abs=1e-6)
+    # All sizes are on one scale, also those of groups coloured otherwise.
+    assert rgb[2:4] == pytest.approx(map_colours(np.array([1.0, 2.0]) / 3.0), abs=1e-6)
+    assert rgb[4] * 255 == pytest.approx([128, 64, 32], abs=1e-3)
 
 
-def test_energy_change_is_relative_to_the_parts_not_to_a_sum_that_may_vanish():
-    first = frame(np.zeros((1, 3)), kinetic_translational=2.0, potential=-2.0)
-    later = frame(np.zeros((1, 3)), kinetic_translational=2.0, potential=-1.0)
-    assert energy_change(later, first) == pytest.approx(0.25)
-    nothing = frame(np.zeros((1, 3)), potential=0.0)
-    assert energy_change(nothing, nothing) == 0.0
+def test_scales_are_given_or_settled_by_the_first_frame():
+    head = header(["sphere"], [0, 0])
+    start = frame([[3.0, 0.0, 0.0], [0.0, 4.0, 0.0]])
+    start.position[:, 2] = 7.0, 9.0
+
+    def scale(kind, **settings):
+        field = field_of(kind, scene(kind, **settings), head, start)
+        return field.low, field.high
+
+    assert scale("by_speed") == pytest.approx((0.0, np.sqrt(4.0 * 12.5)))
+    assert scale("by_speed", gravity=(0.0, 0.0, -2.0)) == pytest.approx((0.0, np.sqrt(4.0 * 12.5 + 16.0)))
+    assert scale("by_speed", span=(1.0, 5.0)) == (1.0, 5.0)
+    assert scale("by_height") == (-2.0, 2.0)
+    assert scale("by_height", boundary="open") == (7.0, 9.0)
+    assert scale("by_size") == (0.5, 1.5)  # all are of size 1
 
 
-@pytest.mark.parametrize("size", [(64, 64), (200, 120), (720, 1280), (1280, 720)])
-@pytest.mark.parametrize("dark", [True, False])
-def test_readout_stays_in_the_picture_and_in_its_corner(size, dark):
-    image = np.full((size[1], size[0], 3), 120, dtype=np.uint8)
-    now = frame(np.zeros((10**6, 3)), 12345.678, impacts=1e9, potential=1.0)
-    Readout(size, dark).draw(image, now, frame(np.zeros((1, 3)), potential=3.0))
-    changed = np.any(image != 120, axis=2)
-    assert changed.any()
-    if min(size) >= 700:
-        assert not changed[:, 320:].any() and not changed[200:].any()
-        panel = image[changed.any(axis=1)][:, changed.any(axis=0)].reshape(-1, 3).astype(int).sum(axis=1)
-        assert panel.max() - panel.min() > 300
+@pytest.mark.parametrize(
+    ("low", "high", "texts"),
+    [
+        (0.0, 7.4, ["0.0", "2.5", "5.0"]),
+        (0.0, 10.0, ["0", "5", "10"]),
+        (-2.0, 2.0, ["-2", "0", "2"]),
+        (0.1, 0.34, ["0.1", "0.2", "0.3"]),
+        (1000.1, 1000.2, ["1000.10", "1000.15", "1000.20"]),
+        (0.0, 3e7, ["0", "1e+07", "2e+07", "3e+07"]),
+        (1e-5, 4e-5, ["1e-05", "2e-05", "3e-05", "4e-05"]),
+    ],
+)
+def test_figures_on_a_scale_are_round(low, high, texts):
+    assert [text for _, text in figures(low, high)] == texts
 
 
-def test_figures_of_the_readout_do_not_move():
-    first = frame(np.zeros((1, 3)))
-    images = []
-    for time in (1.11, 8.88):
-        image = np.full((720, 1280, 3), 255, dtype=np.uint8)
-        Readout((1280, 720), dark=True).draw(image, frame(np.zeros((1, 3)), time), first)
-        images.append(image)
-    changed = np.argwhere(np.any(images[0] != images[1], axis=2))
-    # Only the three figures of the first line differ: not the point, the unit, or the line below.
-    assert np.ptp(changed[:, 0]) < 25 and np.ptp(changed[:, 1]) < 60
+def test_every_scale_has_three_to_five_figures_on_it():
+    rng = np.random.default_rng(2)
+    for low, width in zip(rng.normal(0.0, 10.0, 500), 10.0 ** rng.uniform(-3, 5, 500), strict=True):
+        values = [value for value, _ in figures(low, low + width)]
+        assert 3 <= len(values) <= 5
+        assert low - 1e-6 * width <= values[0] and values[-1] <= low + width * (1 + 1e-6)
 
 
 def test_hull_mesh_is_closed_and_knows_its_edges():

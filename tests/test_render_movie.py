@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from particlesim.rendering import RenderError, movie, write_image, write_movie
+from particlesim.rendering.fade import faded, strength
 
 SIZE = (130, 98)  # even, but no multiples of the 16 pixels that encoders like
 
@@ -58,6 +59,24 @@ def test_a_higher_rate_factor_makes_a_smaller_file(tmp_path):
         write_movie(tmp_path / "a.mp4", noise, 30.0, SIZE, crf)
         sizes.append((tmp_path / "a.mp4").stat().st_size)
     assert sizes[0] > 1.2 * sizes[1] > 2.0 * sizes[2]
+
+
+def test_a_fade_takes_its_time_at_both_ends():
+    seen = [strength(number, 31, 10.0) for number in range(31)]
+    assert seen[0] == seen[-1] == 0.0 and seen[5] == 0.5 and seen[10:21] == [1.0] * 11
+    assert seen == seen[::-1] and np.all(np.diff(seen[:11]) > 0.0)
+    # Two fades that meet in the middle of a short movie.
+    assert max(strength(number, 11, 10.0) for number in range(11)) == 0.5
+    assert strength(0, 1, 0.0) == 1.0
+
+
+def test_what_is_faded_lies_between_the_picture_and_the_background():
+    image = next(images(1))
+    white = np.ones(3)
+    assert faded(image, 1.0, white) is image
+    assert np.all(faded(image, 0.0, white) == 255)
+    half = faded(image, 0.5, white)
+    assert half.dtype == np.uint8 and np.abs(half - (image / 2.0 + 127.5)).max() <= 0.5
 
 
 @pytest.mark.parametrize("stop", [KeyboardInterrupt, ZeroDivisionError])

@@ -216,8 +216,18 @@ def test_the_schema_accepts_what_scene_files_say(schema, everything):
         (("world", "boundary"), ["wall", ["wall", "open", "periodic"]], ["wal", ["wall", "open"]]),
         (("solver", "broad_phase"), ["octree", "grid", "naive", {"kind": "grid", "cells": 4}], ["tree", 4]),
         (("solver", "time_step"), ["auto", 0.1], ["fast", 0, -1]),
+        (("show",), [{"readout": True}, {"readout": ["time", "speed"]}, {}], [{"readout": "on"}, {"readout": ["tme"]}]),
         (("particles", 0, "count"), [0, 5], [-1, "5", True, 2.5]),
-        (("camera",), ["orbit", "fixed", {"kind": "look-at", "position": [1, 2, 3]}], ["look-at", 1]),
+        (
+            ("camera",),
+            [
+                "orbit",
+                {"kind": "fixed", "zoom": 2},
+                {"kind": "look-at", "position": [1, 2, 3]},
+                {"kind": "path", "keys": [{"time": 0, "position": [1, 2, 3]}]},
+            ],
+            ["look-at", 1, "path", {"kind": "path", "keys": [{"time": 0}]}],
+        ),
     ],
     ids=lambda value: ".".join(map(str, value)) if isinstance(value, tuple) else None,
 )

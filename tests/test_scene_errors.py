@@ -15,7 +15,12 @@ COUNT = "must be a whole number from 0 to 100,000,000"
 SIZE = 'must be a number above 0, or a table such as { kind = "uniform", low = 0.1, high = 0.2 }'
 BOUNDARY = "must be 'wall', 'periodic' or 'open', or a list of 3 of them"
 TURN = "[w, x, y, z] (a quaternion), or { axis = [x, y, z], angle = degrees }"
-COLOUR = "must be 'by_shape', 'by_group', 'by_speed', a colour name such as 'steelblue', or '#rrggbb'"
+COLOUR = "must be 'by_shape', 'by_group', 'by_speed', 'by_height', 'by_size', a colour name such as 'steelblue', or '#rrggbb'"
+ROWS = (
+    "must be true, false or a list of 'time', 'particles', 'impacts', 'energy change', 'temperature', 'pressure', "
+    "'speed', 'pairs tested' or 'broad phases'"
+)
+RANGE = "must be [low, high], two numbers, low below high"
 PIXELS = "must be [width, height] in pixels, two even whole numbers from 64 to 7680"
 
 
@@ -35,6 +40,10 @@ def poses(*listed):
 
 def _lines(keys):
     return "".join(f"{key} = {value}\n" for key, value in keys.items() if value is not None)
+
+
+def path_of(*keys):
+    return GOOD + f'[camera]\nkind = "path"\nkeys = [{", ".join(keys)}]\n'
 
 
 BROKEN = [
@@ -65,7 +74,7 @@ BROKEN = [
     ),
     (
         GOOD + "[movie]\nframerate = 3\n",
-        "movie.framerate = 3: unknown key; allowed: fps, quality, resolution, background, crf",
+        "movie.framerate = 3: unknown key; allowed: fps, quality, resolution, background, crf, fade",
     ),
     (GROUP, "the key 'world' is missing"),
     (WORLD, "the key 'particles' is missing"),
@@ -147,6 +156,7 @@ BROKEN = [
     ),
     (GOOD + "[movie]\nquality = 1\n", "movie.quality = 1: must be 'draft', 'normal' or 'high'"),
     (GOOD + "[movie]\ncrf = 52\n", "movie.crf = 52: must be a whole number from 0 (lossless) to 51 (smallest)"),
+    (GOOD + "[movie]\nfade = -1\n", "movie.fade = -1: must be a number of seconds of 0 or more"),
     (GOOD + "[solver]\ntime_step = 0\n", "solver.time_step = 0: must be 'auto' or a number of seconds above 0"),
     (
         GOOD + '[solver]\ntime_step = "fast"\n',
@@ -162,6 +172,37 @@ BROKEN = [
     ),
     (GOOD + '[camera]\nkind = "look-at"\nposition = [0, 0, 0]\n', "camera: position and target must differ"),
     (GOOD + '[camera]\nkind = "orbit"\nperiod = 0\n', "camera.period = 0: must be a number of seconds, not 0"),
+    (
+        GOOD + '[camera]\nkind = "fixed"\nsubject = "wold"\n',
+        "camera.subject = \"wold\": must be 'auto', 'world' or 'particles'; did you mean 'world'?",
+    ),
+    (GOOD + '[camera]\nkind = "orbit"\nzoom = 0\n', "camera.zoom = 0: must be a number above 0"),
+    (GOOD + '[camera]\nkind = "fixed"\nzoom = 2\ndistance = 3\n', "camera: give zoom or distance, not both"),
+    (GOOD + '[camera]\nkind = "path"\n', "camera: the key 'keys' is missing"),
+    (GOOD + '[camera]\nkind = "path"\nkeys = []\n', "camera.keys = []: must not be empty"),
+    (path_of("{ time = 0 }"), "camera.keys[0]: the key 'position' is missing"),
+    (
+        path_of("{ time = 0, positoin = [1, 2, 3] }"),
+        "camera.keys[0].positoin = [1, 2, 3]: unknown key; did you mean 'position'?",
+    ),
+    (path_of("{ time = 0, position = [0, 0, 0] }"), "camera.keys[0]: position and target must differ"),
+    (
+        path_of("{ time = 1, position = [1, 0, 0] }", "{ time = 1, position = [1, 0, 0] }"),
+        "camera.keys: times must grow from key to key, but 1 follows 1",
+    ),
+    (GOOD + "[show]\nreadout = 1\n", f"show.readout = 1: {ROWS}"),
+    (GOOD + '[show]\nreadout = ["tme"]\n', f"show.readout = [\"tme\"]: {ROWS}; did you mean 'time'?"),
+    (GOOD + '[show]\nlegend = "on"\n', 'show.legend = "on": must be true or false'),
+    (group(colour='"by_speed"', colour_range="[1, 1]"), f"particles[0].colour_range = [1, 1]: {RANGE}"),
+    (group(colour='"by_speed"', colour_range="3"), f"particles[0].colour_range = 3: {RANGE}"),
+    (
+        group(colour_range="[0, 1]"),
+        "particles[0]: colour_range goes with the colours 'by_speed', 'by_height' or 'by_size'",
+    ),
+    (
+        group(colour='"by_size"', colour_range="[0, 1]") + GROUP + 'colour = "by_size"\ncolour_range = [0, 2]\n',
+        "particles[1] has another colour_range for by_size than a group before it",
+    ),
     (GOOD + "[show]\nbox = 1\n", "show.box = 1: must be true or false"),
     # What fits.
     (

@@ -1,4 +1,4 @@
-"""Boxes to compare on: made at random for a sweep, or those of the particles of a frame."""
+"""Boxes to compare on, made at random for a sweep."""
 
 from __future__ import annotations
 
@@ -6,9 +6,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-
-from particlesim.constants import SPHERE
-from particlesim.trajectory import Frame, Header
 
 KINDS = ("uniform", "clustered", "mixed")
 
@@ -60,29 +57,3 @@ def make_boxes(kind: str, count: int, seed: int = 1) -> Boxes:
         half = _RATIO ** rng.random(count)
     half *= (FILL / (4.0 / 3.0 * math.pi * (half**3).sum())) ** (1.0 / 3.0)
     return Boxes(centre, half * (_CLUSTER_SHRINK if kind == "clustered" else 1.0))
-
-
-def frame_boxes(header: Header, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper corners (n, 3) float64 [m] of the boxes of all particles of a frame."""
-    lower, upper = np.empty_like(frame.position), np.empty_like(frame.position)
-    for number, shape in enumerate(header.shapes):
-        members = np.flatnonzero(header.shape == number)
-        size = header.size[members, None]
-        if shape.kind == SPHERE:
-            low, high = -0.5 * size, 0.5 * size
-        else:
-            vertices = np.einsum("nij,vj->nvi", _matrices(frame.orientation[members]), shape.vertices)
-            low, high = size * vertices.min(axis=1), size * vertices.max(axis=1)
-        lower[members], upper[members] = frame.position[members] + low, frame.position[members] + high
-    return lower, upper
-
-
-def _matrices(orientation: np.ndarray) -> np.ndarray:
-    """Rotation matrices (n, 3, 3) of unit quaternions (n, 4), body to world."""
-    w, x, y, z = orientation.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)

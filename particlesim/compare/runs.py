@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from particlesim.broad_phase import METHODS
-from particlesim.compare.boxes import frame_boxes
 from particlesim.compare.measure import (
     digest,
     duration,
@@ -22,6 +21,7 @@ from particlesim.compare.measure import (
     peak_memory,
 )
 from particlesim.crew import use_threads
+from particlesim.extents import frame_boxes
 from particlesim.scene import Scene
 from particlesim.simulation import Simulation
 

@@ -7,10 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.scene import Scene
-from particlesim.scene.picture import FixedCamera, LookAtCamera, OrbitCamera
+from particlesim.scene.picture import FixedCamera, LookAtCamera, OrbitCamera, PathCamera
+from particlesim.trajectory import Frame, Header
 
 # The world fills at most this fraction of the picture's width and height.
 FILL = 0.92
+
+# At so many times, evenly spread, it is looked where particles would be.
+_GLANCES = 9
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -23,28 +27,123 @@ class View(NamedTuple):
     near: float  # [m], distance of the nearest plane that is drawn; there is no farthest
 
 
-def view_at(scene: Scene, time: float, aspect: float) -> View:
-    """The scene's camera at ``time`` [s], for a picture of ``aspect`` = width / height."""
+class Box(NamedTuple):
+    """What a camera has to show, in a box along the axes of the world [m]."""
+
+    lower: np.ndarray  # (3,)
+    upper: np.ndarray  # (3,)
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Its middle, (3,) [m]."""
+        return 0.5 * (self.lower + self.upper)
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Its corners, (8, 3) [m]."""
+        return np.array([[(self.lower, self.upper)[k][axis] for axis, k in enumerate(c)] for c in np.ndindex(2, 2, 2)])
+
+
+def world_box(scene: Scene) -> Box:
+    """The world of a scene."""
+    upper = 0.5 * np.asarray(scene.world.size)
+    return Box(-upper, upper)
+
+
+def subject_box(scene: Scene, header: Header, first: Frame) -> Box:
+    """What the scene's camera frames, as ``first``, the frame at the start, foretells it."""
+    subject = getattr(scene.camera, "subject", "world")
+    world = world_box(scene)
+    is_open = np.array([boundary == "open" for boundary in scene.world.boundary])
+    by_particles = {"auto": is_open, "world": np.zeros(3, bool), "particles": np.ones(3, bool)}[subject]
+    if not by_particles.any() or not len(first.position):
+        return world
+    reach = _reach(scene, header, first, world)
+    return Box(np.where(by_particles, reach.lower, world.lower), np.where(by_particles, reach.upper, world.upper))
+
+
+def view_at(scene: Scene, time: float, aspect: float, subject: Box | None = None) -> View:
+    """The scene's camera at ``time`` [s], for a picture of ``aspect`` = width / height.
+
+    ``subject`` is what is framed where the scene leaves the distance open, the world if not given.
+    """
     camera = scene.camera
-    field = np.radians(camera.field_of_view)
-    slope = FILL * np.tan(0.5 * field) * np.array([aspect, 1.0])
-    if isinstance(camera, FixedCamera):
-        pose = _fitted(_axes(camera.azimuth, camera.elevation), _corners(scene), slope)
-    elif isinstance(camera, OrbitCamera):
-        axes = _axes(camera.azimuth + 360.0 * time / camera.period, camera.elevation)
-        distance = camera.distance or _orbit_distance(camera, scene, slope)
-        pose = _pose(axes, np.asarray(camera.target) + distance * axes[:, 2])
+    box = subject or world_box(scene)
+    if isinstance(camera, PathCamera):
+        position, target, field = _on_path(camera, time)
+        return View(_looking(position, target), field, _near(position, scene, box))
+    field = float(np.radians(camera.field_of_view))
+    if isinstance(camera, LookAtCamera):
+        pose = _looking(np.asarray(camera.position), np.asarray(camera.target))
     else:
-        pose = _looking(camera)
-    return View(pose, float(field), _near(pose, scene))
+        slope = FILL * np.tan(0.5 * field) * np.array([aspect, 1.0]) * camera.zoom
+        pose = _fixed(camera, box, slope) if isinstance(camera, FixedCamera) else _orbit(camera, time, box, slope)
+    return View(pose, field, _near(pose[:3, 3], scene, box))
 
 
 def light_azimuth(scene: Scene) -> float:
     """Where the key light comes from [degrees about z]: over the left shoulder of the camera when it starts."""
-    if isinstance(scene.camera, LookAtCamera):
-        away = np.subtract(scene.camera.position, scene.camera.target)
-        return float(np.degrees(np.arctan2(away[1], away[0]))) - 50.0
-    return scene.camera.azimuth - 50.0
+    camera = scene.camera
+    if isinstance(camera, FixedCamera | OrbitCamera):
+        return camera.azimuth - 50.0
+    start = camera.keys[0] if isinstance(camera, PathCamera) else camera
+    away = np.subtract(start.position, start.target)
+    return float(np.degrees(np.arctan2(away[1], away[0]))) - 50.0
+
+
+def _reach(scene: Scene, header: Header, first: Frame, world: Box) -> Box:
+    """Where particles are at first, and where they would fly freely in the scene's duration as far as the world goes.
+
+    A few that fly off for good do not make all others small.
+    """
+    radius = np.array([shape.radius for shape in header.shapes])[header.shape] * header.size
+    lower, upper = _extent(first.position, radius)
+    gravity = np.asarray(scene.world.gravity)
+    for time in np.linspace(0.0, scene.duration, _GLANCES)[1:]:
+        low, high = _extent(first.position + time * first.velocity + 0.5 * time**2 * gravity, radius)
+        lower = np.minimum(lower, np.maximum(low, world.lower))
+        upper = np.maximum(upper, np.minimum(high, world.upper))
+    return Box(lower, upper)
+
+
+def _extent(position: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (3,) of the box round balls."""
+    return (position - radius[:, None]).min(axis=0), (position + radius[:, None]).max(axis=0)
+
+
+def _fixed(camera: FixedCamera, box: Box, slope: np.ndarray) -> np.ndarray:
+    axes = _axes(camera.azimuth, camera.elevation)
+    if camera.distance is not None:
+        return _pose(axes, box.middle + camera.distance * axes[:, 2])
+    return _fitted(axes, box.corners, slope)
+
+
+def _orbit(camera: OrbitCamera, time: float, box: Box, slope: np.ndarray) -> np.ndarray:
+    axes = _axes(camera.azimuth + 360.0 * time / camera.period, camera.elevation)
+    target = box.middle if camera.target is None else np.asarray(camera.target)
+    distance = camera.distance or _orbit_distance(camera.elevation, box.corners - target, slope)
+    return _pose(axes, target + distance * axes[:, 2])
+
+
+def _on_path(camera: PathCamera, time: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Position and target (3,) [m] and vertical field of view [rad] between the keys of a path."""
+    keys = camera.keys
+    values = np.array([(*key.position, *key.target, np.radians(key.field_of_view)) for key in keys])
+    now = _eased(np.array([key.time for key in keys]), values, time) if len(keys) > 1 else values[0]
+    return now[:3], now[3:6], float(now[6])
+
+
+def _eased(times: np.ndarray, values: np.ndarray, time: float) -> np.ndarray:
+    """Values (m,) at ``time`` between rows (k, m) at ``times`` (k,): smooth, at rest at both ends and beyond them.
+
+    A cubic between each two rows whose slopes keep it from swinging beyond either of them (F. N. Fritsch, J. Butland,
+    SIAM J. Sci. Stat. Comput. 5 (1984) 300): where two rows are the same the camera stands still.
+    """
+    from scipy.interpolate import CubicHermiteSpline, PchipInterpolator  # noqa: PLC0415  (slow to import)
+
+    slopes = PchipInterpolator(times, values).derivative()(times)
+    slopes[[0, -1]] = 0.0
+    return CubicHermiteSpline(times, values, slopes)(np.clip(time, times[0], times[-1]))
 
 
 def _axes(azimuth: float, elevation: float) -> np.ndarray:
@@ -62,20 +161,16 @@ def _pose(axes: np.ndarray, position: np.ndarray) -> np.ndarray:
     return pose
 
 
-def _looking(camera: LookAtCamera) -> np.ndarray:
-    position = np.asarray(camera.position)
-    back = position - np.asarray(camera.target)
-    back = back / np.linalg.norm(back)
+def _looking(position: np.ndarray, target: np.ndarray) -> np.ndarray:
+    back = position - target
+    distance = np.linalg.norm(back)
+    # A path may lead through its own target: there any direction is as good.
+    back = back / distance if distance > 0.0 else np.array([1.0, 0.0, 0.0])
     right = np.cross(_UP, back)
     length = np.linalg.norm(right)
     # Straight up or down there is no horizon: the picture's right is then +y, as for an azimuth of zero.
     right = right / length if length > 1e-9 else np.array([0.0, 1.0, 0.0])
     return _pose(np.column_stack([right, np.cross(back, right), back]), position)
-
-
-def _corners(scene: Scene) -> np.ndarray:
-    signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    return 0.5 * signs * np.asarray(scene.world.size)
 
 
 def _fitted(axes: np.ndarray, points: np.ndarray, slope: np.ndarray) -> np.ndarray:
@@ -92,19 +187,20 @@ def _fitted(axes: np.ndarray, points: np.ndarray, slope: np.ndarray) -> np.ndarr
     return _pose(axes, axes @ np.array([*sideways, distance]))
 
 
-def _orbit_distance(camera: OrbitCamera, scene: Scene, slope: np.ndarray) -> float:
-    """The distance from the target at which the world stays in the picture all the way round."""
+def _orbit_distance(elevation: float, corners: np.ndarray, slope: np.ndarray) -> float:
+    """The distance from the target at which corners (k, 3) [m] from it stay in the picture all the way round."""
     # Seen by a camera that circles, a corner runs round a circle about the target's axis.
-    corners = _corners(scene) - np.asarray(camera.target)
     radius = np.hypot(corners[:, 0], corners[:, 1])[:, None]
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
     height = np.broadcast_to(corners[:, 2:], (len(corners), len(turn)))
     swept = np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=-1).reshape(-1, 3)
-    local = swept @ _axes(0.0, camera.elevation)
+    local = swept @ _axes(0.0, elevation)
     return float((np.abs(local[:, :2]) / slope + local[:, 2:]).max())
 
 
-def _near(pose: np.ndarray, scene: Scene) -> float:
+def _near(position: np.ndarray, scene: Scene, box: Box) -> float:
     """Nearest distance [m] worth drawing: the nearer it is, the coarser are depths in the picture."""
+    # What is much smaller than its world is looked at from near by.
     reach = float(np.linalg.norm(scene.world.size))
-    return max(float(np.linalg.norm(pose[:3, 3])) - reach, 2e-3 * reach)
+    small = 2e-3 * min(reach, float(np.linalg.norm(box.upper - box.lower)))
+    return max(float(np.linalg.norm(position)) - reach, small)

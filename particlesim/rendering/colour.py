@@ -1,11 +1,13 @@
-"""The colour of every particle, in linear light: by its shape, its group, its speed, or as the scene names it."""
+"""The colour of every particle, in linear light: by its shape, its group, a field, or as the scene names it."""
 
 from __future__ import annotations
 
 import numpy as np
 from PIL import ImageColor
 
+from particlesim.rendering.fields import field_of
 from particlesim.scene import Scene
+from particlesim.scene.groups import FIELDS
 from particlesim.trajectory import Frame, Header
 
 # Eight colours that colour-blind people tell apart: M. Okabe and K. Ito, "Color Universal Design" (2008), less black.
@@ -16,7 +18,7 @@ _SHAPE_COLOUR = {"sphere": 0, "cube": 1, "pyramid": 2, "tetrahedron": 4, "box": 
 
 # Nine evenly spaced values of the map 'viridis' of S. van der Walt and N. Smith (2015, public domain), whose
 # lightness grows evenly.
-_SPEED_MAP = (
+_FIELD_MAP = (
     "#440154", "#472D7B", "#3B528B", "#2C728E", "#21918C", "#28AE80", "#5EC962", "#ADDC30", "#FDE725",
 )  # fmt: skip
 
@@ -32,32 +34,39 @@ def parse(colour: str) -> np.ndarray:
 
 
 class ParticleColours:
-    """Colours for the frames of one movie. The scale of speeds is settled by its first frame and kept."""
+    """Colours for the frames of one movie. The scales of fields are settled by its first frame and kept.
+
+    ``fields``: those that particles are coloured by.
+    """
 
     def __init__(self, scene: Scene, header: Header, first: Frame) -> None:
+        self._header = header
         self._fixed = _fixed_colours(scene, header)
-        by_speed = np.array([group.colour == "by_speed" for group in scene.particles])
-        self._by_speed = np.flatnonzero(by_speed[header.group])
-        self._fastest = _top_speed(scene, first)
+        kinds = [kind for kind in FIELDS if any(group.colour == kind for group in scene.particles)]
+        self.fields = [field_of(kind, scene, header, first) for kind in kinds]
+        # Which of the fields a particle is coloured by, or -1.
+        number = {kind: k for k, kind in enumerate(kinds)}
+        self._field = np.array([number.get(group.colour, -1) for group in scene.particles])[header.group]
 
-    def __call__(self, frame: Frame) -> np.ndarray:
-        """Linear RGB of every particle, (n, 3) float32. The array is used again for the next frame."""
-        if len(self._by_speed):
-            speed = np.linalg.norm(frame.velocity[self._by_speed], axis=1)
-            self._fixed[self._by_speed] = speed_colours(speed / self._fastest)
-        return self._fixed
-
-
-def speed_colours(fraction: np.ndarray) -> np.ndarray:
-    """Linear RGB (n, 3) float32 of speeds (n,) given as fractions of the fastest; faster ones are cut there."""
-    return (map_colours(fraction) ** 2).astype(np.float32)
+    def __call__(self, frame: Frame, members: np.ndarray) -> np.ndarray:
+        """Linear RGB (k, 3) float32 of the particles ``members`` (k,)."""
+        colours = self._fixed[members]
+        for number, field in enumerate(self.fields):
+            mine = self._field[members] == number
+            fraction = field.fractions(self._header, frame, members[mine])
+            colours[mine] = _LINEAR[np.clip(np.rint(fraction * (len(_LINEAR) - 1)), 0, len(_LINEAR) - 1).astype(int)]
+        return colours
 
 
 def map_colours(fraction: np.ndarray) -> np.ndarray:
     """sRGB 0 .. 1 (n, 3) of numbers (n,) 0 .. 1, in colours whose lightness grows with the number."""
-    anchors = np.array([encoded(colour) for colour in _SPEED_MAP])
+    anchors = np.array([encoded(colour) for colour in _FIELD_MAP])
     place = np.linspace(0.0, 1.0, len(anchors))
     return np.column_stack([np.interp(fraction, place, channel) for channel in anchors.T])
+
+
+# The map in linear light, fine enough that no step of 8 bits is left out.
+_LINEAR = (map_colours(np.linspace(0.0, 1.0, 1024)) ** 2).astype(np.float32)
 
 
 def shape_colours(header: Header) -> np.ndarray:
@@ -83,13 +92,6 @@ def _fixed_colours(scene: Scene, header: Header) -> np.ndarray:
             colours[members] = by_shape[header.shape[members]]
         elif group.colour == "by_group":
             colours[members] = parse(PALETTE[number % len(PALETTE)])
-        elif group.colour != "by_speed":
+        elif group.colour not in FIELDS:
             colours[members] = parse(group.colour)
     return colours
-
-
-def _top_speed(scene: Scene, first: Frame) -> float:
-    """The speed [m/s] of the last colour: twice the first r.m.s., and what a fall through the world adds to it."""
-    mean_square = float(np.mean(np.sum(first.velocity**2, axis=1))) if len(first.velocity) else 0.0
-    fall = float(np.abs(scene.world.gravity) @ np.asarray(scene.world.size))
-    return float(np.sqrt(4.0 * mean_square + 2.0 * fall)) or 1.0

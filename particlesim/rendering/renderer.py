@@ -8,13 +8,13 @@ import numpy as np
 
 from particlesim.constants import SPHERE
 from particlesim.rendering import geometry, platform
-from particlesim.rendering.camera import View, view_at
+from particlesim.rendering.camera import Box, View, subject_box, view_at
 from particlesim.rendering.cells import cell_lines
 from particlesim.rendering.colour import ParticleColours, encoded
 from particlesim.rendering.ground import Ground
 from particlesim.rendering.lighting import key_light
 from particlesim.rendering.outlook import Outlook
-from particlesim.rendering.overlay import Readout
+from particlesim.rendering.overlay import Overlay
 from particlesim.rendering.quality import PRESETS
 from particlesim.rendering.sky import Sky
 from particlesim.rendering.smoothing import smooth_edges
@@ -48,11 +48,12 @@ class Renderer:
         self._header = header
         self._first = first
         self._colours: ParticleColours | None = None
+        self._subject: Box | None = None
+        self._overlay: Overlay | None = None
         self._background = encoded(scene.movie.background)
         self._dark = bool(self._background.mean() < 0.5)
         # A shade off the background, so that the floor is seen, and a shadow on it even when that is black.
         self._floor = self._background * 0.97 + (0.06 if self._dark else 0.0)
-        self._readout = Readout(self._size, self._dark) if scene.show.readout else None
         self._bodies = bodies = _bodies(header)
         self._samples = quality.samples
         self._canvas_size = (quality.samples * self._size[0], quality.samples * self._size[1])
@@ -101,18 +102,20 @@ class Renderer:
         self._first = first = self._first or frame
         if self._colours is None:
             self._colours = ParticleColours(self._scene, self._header, first)
-        view = view_at(self._scene, frame.time, self._size[0] / self._size[1])
-        owner, spheres = self._put_particles(frame, self._colours(frame), view)
+            self._subject = subject_box(self._scene, self._header, first)
+            self._overlay = Overlay(self._scene, self._header, first, self._colours, self._dark)
+        view = view_at(self._scene, frame.time, self._size[0] / self._size[1], self._subject)
+        owner, spheres = self._put_particles(frame, self._colours, view)
         self._put_lines(view, cells)
         ground = self._ground.light(frame.position) if self._ground is not None else np.ones((1, 1), dtype=np.float32)
         shadow = self._shadow_map(frame)
         image = self._canvas.draw(self._bridge.Picture(self._view_block(view), shadow, owner, spheres, ground))
         image = smooth_edges(image) if self._smooth else np.ascontiguousarray(image[::-1, :, :3])
-        if self._readout is not None:
-            self._readout.draw(image, frame, first)
+        if self._overlay is not None:
+            self._overlay.draw(image, frame)
         return image
 
-    def _put_particles(self, frame: Frame, colours: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray]:
+    def _put_particles(self, frame: Frame, colours: ParticleColours, view: View) -> tuple[np.ndarray, np.ndarray]:
         """Hulls into their layers; of spheres, the number at each pixel, and their rows (see Picture)."""
         slope = float(np.tan(0.5 * view.field_of_view))
         axes = view.pose[:3, :3].T * np.array([[1.0], [1.0], [-1.0]])
@@ -128,10 +131,10 @@ class Renderer:
         place_radius = np.column_stack([frame.position[members], self._bodies.outer[members]])
         return sight.owner, np.hstack([place_radius, self._paint(frame, colours, members)], dtype=np.float32)
 
-    def _paint(self, frame: Frame, colours: np.ndarray, members: np.ndarray) -> np.ndarray:
+    def _paint(self, frame: Frame, colours: ParticleColours, members: np.ndarray) -> np.ndarray:
         """Linear colour, and share of the sky's light, of some particles, (k, 4) float64."""
         light = self._sky.light(frame.position, members) if self._sky is not None else np.ones(len(members))
-        return np.column_stack([colours[members], light])
+        return np.column_stack([colours(frame, members), light])
 
     def _shadow_map(self, frame: Frame) -> np.ndarray:
         """How deep the key light goes into its box, (h, w) float32, 0 .. 1."""
@@ -147,7 +150,7 @@ class Renderer:
         rows = [np.zeros((0, 11), dtype=np.float32)]
         if cells is not None:
             rows.append(cell_lines(*cells, width=0.8 * width))
-        if self._scene.show.box:
+        if self._scene.box_shown:
             upper = 0.5 * np.asarray(self._scene.world.size)
             start, end = (ends[0] for ends in geometry.box_edges(-upper[None], upper[None]))
             colour = np.full((12, 4), 0.75 if self._dark else 0.25)

@@ -166,7 +166,7 @@ def _look(balls, order, bodies, orientation, axes, parallel, window, sides, clos
 
 @kernel
 def _span(low, high, middle, scale, first, last):
-    """Of the pixels ``first .. last`` those whose middles lie between two lines [m at distance 1]: first, and past last."""
+    """The pixels of ``first .. last`` whose middles lie between two lines [m at distance 1]: first, past last."""
     start = middle + scale * low - 0.5
     end = middle + scale * high - 0.5
     # Compared as numbers first: a line may be farther away than an integer can say.

@@ -31,6 +31,14 @@ class Scene(Model):
     show: Show = Field(default_factory=Show)
 
     @model_validator(mode="after")
+    def _one_scale_for_a_field(self) -> Scene:
+        ranges: dict[str, tuple[float, float]] = {}
+        for g, group in enumerate(self.particles):
+            if group.colour_range and ranges.setdefault(group.colour, group.colour_range) != group.colour_range:
+                raise ValueError(f"particles[{g}] has another colour_range for {group.colour} than a group before it")
+        return self
+
+    @model_validator(mode="after")
     def _storable(self) -> Scene:
         if self.number > MAX_COUNT:
             raise ValueError(f"{self.number:,} particles in all; there may be up to {MAX_COUNT:,}")
@@ -40,6 +48,12 @@ class Scene(Model):
     def number(self) -> int:
         """How many particles the scene has."""
         return sum(group.number for group in self.particles)
+
+    @property
+    def box_shown(self) -> bool:
+        """Whether the edges of the world are drawn."""
+        nothing_there = all(boundary == "open" for boundary in self.world.boundary)
+        return self.show.box if self.show.box is not None else not nothing_there
 
     @property
     def frames(self) -> int:

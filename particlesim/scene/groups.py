@@ -34,7 +34,7 @@ from particlesim.scene.base import (
     shorthand,
     whole,
 )
-from particlesim.scene.wording import hint, must_be
+from particlesim.scene.wording import hint, listed, must_be
 
 
 class PlainShape(Model):
@@ -291,6 +291,19 @@ Velocity = Annotated[_Velocities, _or_vector(_Velocities)]
 Spin = Annotated[_Spins, _or_vector(_Spins)]
 
 
+# Colours that stand for a quantity.
+FIELDS = "by_speed", "by_height", "by_size"
+
+
+def _rising(value: tuple[float, float]) -> tuple[float, float]:
+    if value[0] >= value[1]:
+        raise ValueError("does not rise")
+    return value
+
+
+Range = Annotated[tuple[Number, Number], AfterValidator(_rising), must_be("[low, high], two numbers, low below high")]
+
+
 class Group(Model):
     """Particles of one shape, one law of sizes and one start."""
 
@@ -307,16 +320,19 @@ class Group(Model):
     orientation: AnyOrientation = "random"
     velocity: Velocity = Field(default_factory=lambda: Rest(kind="rest"))
     spin: Spin = Field(default_factory=lambda: Rest(kind="rest"))
-    colour: Annotated[Text, colour_or("by_shape", "by_group", "by_speed")] = "by_shape"
+    colour: Annotated[Text, colour_or("by_shape", "by_group", *FIELDS)] = "by_shape"
+    colour_range: Range | None = None  # of the field's scale; settled by the first frame if not given
 
     @model_validator(mode="after")
     def _consistent(self) -> Group:
         if self.density is not None and self.mass is not None:
             raise ValueError("give density or mass, not both")
+        if self.colour_range is not None and self.colour not in FIELDS:
+            raise ValueError(f"colour_range goes with the colours {listed(FIELDS)}")
         if isinstance(self.placement, ListPlacement):
-            listed = len(self.placement.poses)
-            if self.count is not None and self.count != listed:
-                raise ValueError(f"count is {self.count}, but there are {listed} in poses")
+            there = len(self.placement.poses)
+            if self.count is not None and self.count != there:
+                raise ValueError(f"count is {self.count}, but there are {there} in poses")
         elif self.count is None:
             raise ValueError("the key 'count' is missing")
         return self

@@ -1,0 +1,52 @@
+"""How a command fails: one line on standard error and an exit code."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NoReturn
+
+import typer
+
+
+class OptionError(ValueError):
+    """The value of an option that is not allowed: the option, the value and what is allowed, in one line."""
+
+
+@contextmanager
+def one_line_errors(source: Path) -> Iterator[None]:
+    """Expected failures as one line on standard error and an exit code; anything else is a bug and shows where."""
+    try:
+        from particlesim.rendering import RenderError  # noqa: PLC0415
+        from particlesim.scene.file import SceneError  # noqa: PLC0415
+
+        try:
+            yield
+        except SceneError as error:
+            fail(str(error if error.file else error.within(source)), 2)
+        except BrokenPipeError:  # whoever reads the output has seen enough; typer ends the program
+            raise
+        except (RenderError, OSError) as error:
+            fail(_described(error), 1)
+        except (ValueError, RuntimeError) as error:
+            # Errors of other modules of ours, which need not be imported to catch them.
+            if not type(error).__module__.startswith("particlesim."):
+                raise
+            fail(str(error), 2 if isinstance(error, ValueError) else 1)
+    except KeyboardInterrupt:
+        fail("interrupted; nothing was written", 130)
+
+
+def _described(error: Exception) -> str:
+    """An error of ours as it is, one of the system with the file it is about."""
+    if isinstance(error, OSError) and error.strerror:
+        return ": ".join([str(name) for name in (error.filename,) if name] + [error.strerror])
+    return str(error)
+
+
+def fail(message: str, code: int) -> NoReturn:
+    """End the program with a line and this exit code."""
+    print(message, file=sys.stderr)
+    raise typer.Exit(code)

@@ -1,0 +1,36 @@
+"""Options that several commands have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def _at_least_one(threads: int | None) -> int | None:
+    if threads is not None and threads < 1:
+        raise typer.BadParameter("must be 1 or more")
+    return threads
+
+
+def _not_negative(drift: float | None) -> float | None:
+    if drift is not None and not drift >= 0.0:
+        raise typer.BadParameter("must be a number of 0 or more")
+    return drift
+
+
+SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Threads = Annotated[
+    int | None, typer.Option("--threads", callback=_at_least_one, help="Threads to simulate with.  [default: all]")
+]
+MaxDrift = Annotated[
+    float | None,
+    typer.Option(
+        "--max-drift",
+        metavar="X",
+        callback=_not_negative,
+        help="End with exit code 3 if the energy drifts by more than this fraction of it; the output is kept.",
+    ),
+]

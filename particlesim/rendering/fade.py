@@ -1,0 +1,25 @@
+"""The opening and the close of a movie: out of its background and into it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def strength(number: int, total: int, frames: float) -> float:
+    """How much of picture ``number`` of ``total`` is seen, 0 .. 1, if the fades at both ends take ``frames`` pictures.
+
+    The first and the last are all background.
+    """
+    if frames <= 0.0:
+        return 1.0
+    share = min(1.0, number / frames, (total - 1 - number) / frames)
+    # Without a jerk where it begins and ends.
+    return share * share * (3.0 - 2.0 * share)
+
+
+def faded(image: np.ndarray, seen: float, background: np.ndarray) -> np.ndarray:
+    """An image (h, w, 3) uint8 of which so much is seen, 0 .. 1, before ``background`` (3,) sRGB 0 .. 1."""
+    if seen >= 1.0:
+        return image
+    blend = seen * image + (1.0 - seen) * 255.0 * background
+    return (blend + 0.5).astype(np.uint8)

@@ -1,0 +1,98 @@
+"""Panels in the corners of a picture: a plate that keeps text legible whatever is behind it, letters and patches."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+# Plate, strong text and faint text in sRGB, for pictures with a dark background and with a light one. The plate lets a
+# little of the picture through.
+_DARK = np.array([[22.0, 25.0, 29.0], [245.0, 245.0, 242.0], [176.0, 180.0, 184.0]])
+_LIGHT = np.array([[252.0, 252.0, 250.0], [24.0, 27.0, 31.0], [96.0, 100.0, 104.0]])
+_OPACITY = 0.82
+
+# Height of letters as a fraction of the picture's shorter side, and the least [pixels]: below that they run together.
+_TEXT = 0.026
+_SMALLEST = 12.0
+
+
+class Style:
+    """Letters and colours of the panels of one movie, for pictures of ``size`` (width, height), ``dark`` or light."""
+
+    def __init__(self, size: tuple[int, int], dark: bool) -> None:
+        self.em = max(_SMALLEST, _TEXT * min(size))  # height of the letters [pixels]
+        self.plate, self.strong, self.faint = _DARK if dark else _LIGHT
+        self._font = ImageFont.load_default(size=self.em)
+        self.glyph = functools.cache(self._draw_glyph)
+
+    @property
+    def margin(self) -> int:
+        """Distance of panels from the edges and from each other [pixels]."""
+        return round(0.9 * self.em)
+
+    @property
+    def pad(self) -> int:
+        """Distance of what is on a panel from its edges [pixels]."""
+        return round(0.7 * self.em)
+
+    @property
+    def line(self) -> int:
+        """From one line of text to the next [pixels]."""
+        return round(1.45 * self.em)
+
+    def width(self, text: str) -> int:
+        """How wide text is [pixels]."""
+        return sum(self.glyph(letter)[1] for letter in text)
+
+    def _draw_glyph(self, letter: str) -> tuple[np.ndarray, int]:
+        """How much ink a letter leaves, (h, w) 0 .. 1, and how far the next one stands [pixels]."""
+        # Whole pixels, and one width for all figures: a number changes in place, nothing else moves.
+        advance = round(self._font.getlength("0" if letter.isdigit() else letter))
+        tile = Image.new("L", (advance + round(0.3 * self.em), round(1.4 * self.em)))
+        ImageDraw.Draw(tile).text((0, 0), letter, fill=255, font=self._font)
+        return np.asarray(tile, dtype=np.float64) / 255.0, advance
+
+
+class Panel:
+    """A plate (height, width) [pixels] with text and patches on it, to be laid over pictures."""
+
+    def __init__(self, style: Style, height: int, width: int) -> None:
+        self._style = style
+        self._colour = np.tile(style.plate, (height, width, 1))
+        self._opacity = np.full((height, width, 1), _OPACITY)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Height and width [pixels]."""
+        height, width = self._colour.shape[:2]
+        return height, width
+
+    def write(self, text: str, left: int, top: int, *, faint: bool = False) -> None:
+        """Put text on it; ``left`` and ``top`` [pixels] from its upper left corner."""
+        style = self._style
+        ink = style.faint if faint else style.strong
+        for letter in text:
+            mask, advance = style.glyph(letter)
+            rows, columns = slice(top, top + mask.shape[0]), slice(max(left, 0), left + mask.shape[1])
+            room = self._colour[rows, columns]
+            share = mask[: room.shape[0], : room.shape[1], None]
+            room += share * (ink - room)
+            opacity = self._opacity[rows, columns]
+            np.maximum(opacity, share, out=opacity)
+            left += advance
+
+    def fill(self, colour: np.ndarray, left: int, top: int) -> None:
+        """Put a patch of sRGB colours (h, w, 3) 0 .. 255 on it, which lets nothing through."""
+        height, width = colour.shape[:2]
+        self._colour[top : top + height, left : left + width] = colour
+        self._opacity[top : top + height, left : left + width] = 1.0
+
+    def lay(self, image: np.ndarray, left: int, top: int) -> None:
+        """Lay it over a picture (h, w, 3) uint8, as far as that goes."""
+        below = image[top : top + self._colour.shape[0], left : left + self._colour.shape[1]]
+        height, width = below.shape[:2]
+        opacity = self._opacity[:height, :width]
+        blend = (1.0 - opacity) * below + opacity * self._colour[:height, :width]
+        below[:] = np.clip(blend + 0.5, 0.0, 255.0).astype(np.uint8)

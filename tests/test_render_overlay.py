@@ -1,0 +1,227 @@
+"""The readout and the legends: what they say, where they lie, and that they hold still."""
+
+import numpy as np
+import pytest
+
+import particlesim as ps
+from particlesim import shapes
+from particlesim.broad_phase import METHODS
+from particlesim.extents import frame_boxes
+from particlesim.rendering.colour import PALETTE, ParticleColours, encoded, map_colours
+from particlesim.rendering.legend import swatches
+from particlesim.rendering.overlay import Overlay, legend_places
+from particlesim.rendering.panel import Panel, Style
+from particlesim.rendering.readout import Moment, Readout, energy_change, pressure
+from particlesim.scene import Scene
+from particlesim.trajectory import Frame, Header
+from tests.gases import spheres
+from tests.worlds import gas
+
+
+def make_header(count, group=None):
+    zero = np.zeros(count, dtype=int)
+    one = np.ones(count)
+    return Header("", (shapes.sphere(),), zero, one, zero if group is None else group, one, np.ones((count, 3)))
+
+
+def make_frame(count=1, time=0.0, velocity=(0.0, 0.0, 0.0), **ledger):
+    zero = np.zeros((count, 3))
+    turn = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
+    return Frame(time, zero, turn, np.tile(np.asarray(velocity, float), (count, 1)), zero, zero.astype(int), ledger)
+
+
+def make_scene(*groups, size=(1280, 720), world=None, **show):
+    groups = groups or ({"shape": "sphere", "count": 1},)
+    world = {"size": (2.0, 3.0, 4.0), **(world or {})}
+    return Scene(world=world, particles=groups, show=show, movie={"resolution": size})
+
+
+def rows_of(scene, frame, first, header=None):
+    rows = Readout(scene, header or make_header(len(frame.position)), first)(frame)
+    return [(row.name, row.value) for row in rows]
+
+
+def overlay(scene, frame, first, dark=True, header=None):
+    header = header or make_header(len(first.position))
+    return Overlay(scene, header, first, ParticleColours(scene, header, first), dark)
+
+
+def drawn(scene, frame, first=None, dark=True, header=None):
+    """What the overlay changes in a grey picture, (h, w) bool, and the picture."""
+    width, height = scene.movie.size
+    image = np.full((height, width, 3), 120, dtype=np.uint8)
+    overlay(scene, frame, first or frame, dark, header).draw(image, frame)
+    return np.any(image != 120, axis=2), image
+
+
+def test_the_usual_readout_says_what_the_ledger_knows():
+    first = make_frame(1234, kinetic_translational=3.0, kinetic_rotational=1.0)
+    later = make_frame(1234, 1.5, kinetic_translational=1.0, kinetic_rotational=1.0, potential=1.9, impacts=12345.0)
+    assert rows_of(make_scene(), later, first) == [
+        ("time", "1.50 s"),
+        ("particles", "1,234"),
+        ("impacts", "12,345"),
+        ("energy change", "-2.5 %"),
+    ]
+    nothing = make_frame()
+    assert [name for name, _ in rows_of(make_scene(), nothing, first)] == ["time", "particles"]
+    assert rows_of(make_scene(), first, first)[-1] == ("energy change", "0")
+    assert rows_of(make_scene(readout=False), later, first) == []
+
+
+def test_rows_come_in_the_order_of_the_list():
+    scene = make_scene(readout=["temperature", "speed", "time"])
+    frame = make_frame(4, 2.0, velocity=(3.0, 4.0, 0.0), kinetic_translational=60.0)
+    assert rows_of(scene, frame, frame) == [("temperature", "10.00 J"), ("mean speed", "5.000 m/s"), ("time", "2.00 s")]
+
+
+def test_pairs_tested_are_those_of_the_broad_phases():
+    scene = gas(60, show={"readout": ["pairs tested", "broad phases"]}, broad_phase={"kind": "grid", "cells": 3})
+    simulation = ps.Simulation(scene)
+    frame = simulation.frame()
+    rows = dict(rows_of(scene, frame, frame, simulation.header))
+    lower, upper = frame_boxes(simulation.header, frame)
+    tested = {name: METHODS[name](lower, upper, np.zeros(3))[1] for name in METHODS}
+    assert rows["naive tests"] == f"{tested['naive']:,}" == f"{240 * 239 // 2:,}"
+    assert (rows["boxing tests"], rows["octree tests"]) == (f"{tested['grid']:,}", f"{tested['octree']:,}")
+    own = METHODS["grid"](lower, upper, np.zeros(3), cells=3)[1]
+    assert rows["pairs tested"] == f"{100 * own / tested['naive']:.2f} %"
+
+
+def pressure_of(sim, duration):
+    moments = [Moment(sim.time, sim.ledger.row())]
+    for _ in range(10):
+        sim.run(duration / 10)
+        moments.append(Moment(sim.time, sim.ledger.row()))
+    return pressure(sim.scene, moments)
+
+
+def test_the_pressure_is_that_of_the_equation_of_state_on_walls_and_without():
+    fill = 0.1
+    compressibility = (1 + fill + fill**2 - fill**3) / (1 - fill) ** 3  # Carnahan and Starling
+    periodic = spheres(500, fill)
+    density = 500 / np.prod(periodic.scene.world.size)
+    assert pressure_of(periodic, 10.0) == pytest.approx(density * compressibility, rel=0.05)
+    # Centres stay half a diameter off the walls: a little denser inside.
+    walled = spheres(500, fill, boundary="wall")
+    assert pressure_of(walled, 10.0) == pytest.approx(density * compressibility, rel=0.2)
+    assert pressure_of(walled, 10.0) > density
+
+
+def test_a_world_that_is_open_has_no_pressure_and_a_first_frame_not_yet():
+    ledger = {"wall_impulse": np.ones(6), "virial": 1.0, "kinetic_translational": 1.0}
+    moments = [Moment(0.0, ledger), Moment(1.0, ledger)]
+    assert pressure(make_scene(world={"boundary": ("open", "periodic", "open")}), moments) is None
+    scene = make_scene(readout=["pressure"])
+    assert rows_of(scene, make_frame(**ledger), make_frame(**ledger)) == []
+    later = {**ledger, "wall_impulse": np.array([1.0, 1.0, 1.0, 1.0, 1.0, 53.0])}
+    # 52 N s on 52 m^2 in 2 s.
+    assert rows_of(scene, make_frame(time=2.0, **later), make_frame(**ledger)) == [("pressure", "0.5000 Pa")]
+
+
+def test_energy_change_is_relative_to_the_parts_not_to_a_sum_that_may_vanish():
+    first = make_frame(kinetic_translational=2.0, potential=-2.0)
+    later = make_frame(kinetic_translational=2.0, potential=-1.0)
+    assert energy_change(later, first) == pytest.approx(0.25)
+    nothing = make_frame(potential=0.0)
+    assert energy_change(nothing, nothing) == 0.0
+
+
+@pytest.mark.parametrize("size", [(64, 64), (200, 120), (720, 1280), (1280, 720)])
+@pytest.mark.parametrize("dark", [True, False])
+def test_readout_stays_in_the_picture_and_in_its_corner(size, dark):
+    now = make_frame(10**6, 12345.678, impacts=1e9, potential=1.0)
+    changed, image = drawn(make_scene(size=size), now, make_frame(10**6, potential=3.0), dark)
+    assert changed.any()
+    if min(size) >= 700:
+        assert not changed[:, 320:].any() and not changed[200:].any()
+        panel = image[changed.any(axis=1)][:, changed.any(axis=0)].reshape(-1, 3).astype(int).sum(axis=1)
+        assert panel.max() - panel.min() > 300
+
+
+def test_figures_of_the_readout_do_not_move():
+    images = [drawn(make_scene(), make_frame(time=time), make_frame())[1] for time in (1.11, 8.88)]
+    changed = np.argwhere(np.any(images[0] != images[1], axis=2))
+    # Only the three figures of the first line differ: not the point, the unit, or the line below.
+    assert np.ptp(changed[:, 0]) < 25 and np.ptp(changed[:, 1]) < 60
+
+
+def test_letters_are_large_enough_to_read_in_a_draft():
+    assert Style((640, 360), dark=False).em >= 12.0
+    assert Style((1920, 1080), dark=False).em > 1.4 * Style((1280, 720), dark=False).em
+
+
+SPEED = {"shape": "sphere", "count": 1, "colour": "by_speed", "colour_range": (0.0, 4.0)}
+HEIGHT = {"shape": "sphere", "count": 1, "colour": "by_height"}
+
+
+@pytest.mark.parametrize("size", [(640, 360), (1280, 720), (480, 480), (360, 640)])
+def test_legends_touch_neither_the_readout_nor_each_other(size):
+    both = make_header(2, np.array([0, 1]))
+    frame = make_frame(2, impacts=1.0, potential=1.0)
+    groups = {"speed": [SPEED, SPEED], "both": [SPEED, HEIGHT]}
+    shown = {
+        (name, readout): drawn(make_scene(*group, size=size, readout=readout), frame, header=both)[0]
+        for name, group in groups.items()
+        for readout in (True, False)
+    }
+    readout = drawn(
+        make_scene({**SPEED, "colour": "red", "colour_range": None}, size=size),
+        make_frame(1, impacts=1.0, potential=1.0),
+    )[0]
+    for name, group in groups.items():
+        legends = shown[name, True] & ~readout
+        assert legends.sum() > 0.9 * 11 * 3 * 12 * 12 * len(set(map(str, group)))
+        rows, columns = np.nonzero(legends)
+        # Not at an edge of the picture, not within the readout or at its side.
+        assert min(rows.min(), columns.min()) > 5 and not legends[-6:].any() and not legends[:, -6:].any()
+        grown = np.roll(readout, 5, axis=1) | np.roll(readout, 5, axis=0)
+        assert not (grown & legends).any()
+    assert (shown["both", False].sum()) == 2 * (shown["speed", False].sum())
+
+
+def test_the_bar_of_a_legend_has_the_colours_of_the_map_in_order():
+    changed, image = drawn(make_scene(SPEED, readout=False), make_frame())
+    colours = image[changed].astype(int)
+    for fraction in (0.0, 0.25, 0.5, 0.75, 1.0):
+        wanted = 255.0 * map_colours(np.array([fraction]))[0]
+        assert np.abs(colours - wanted).sum(axis=1).min() < 8
+
+
+def test_the_legend_stays_the_same_while_speeds_change():
+    first, later = make_frame(), make_frame(time=1.0, velocity=(3.0, 0.0, 0.0))
+    scene = make_scene(SPEED, readout=False)
+    assert np.array_equal(drawn(scene, first)[1], drawn(scene, later, first)[1])
+
+
+def test_legends_are_shown_for_fields_unless_told_otherwise():
+    plain = {"shape": "sphere", "count": 1, "colour": "red", "name": "red one"}
+    shown = {
+        (name, legend): drawn(make_scene(group, readout=False, legend=legend), make_frame())[0].any()
+        for name, group in (("field", SPEED), ("plain", plain))
+        for legend in (None, True, False)
+    }
+    assert [key for key, there in shown.items() if there] == [("field", None), ("field", True), ("plain", True)]
+
+
+def test_swatches_name_groups_and_shapes_once_each():
+    groups = [
+        {"shape": "sphere", "count": 1},
+        {"shape": "sphere", "count": 1},
+        {"shape": "sphere", "count": 1, "colour": "by_group"},
+        {"shape": "sphere", "count": 1, "colour": "#ff8000", "name": "e = 1"},
+        SPEED,
+        {"shape": "sphere", "count": 0, "colour": "red"},
+    ]
+    named = swatches(make_scene(*groups), make_header(5, np.arange(5)))
+    assert [swatch.name for swatch in named] == ["sphere", "group 3", "e = 1"]
+    assert named[1].colour == pytest.approx(encoded(PALETTE[2]))
+    assert named[2].colour == pytest.approx([1.0, 0x80 / 255, 0.0])
+
+
+def test_legends_that_do_not_fit_are_left_out():
+    style = Style((100, 100), dark=False)
+    panels = [Panel(style, 40, 60)] * 3
+    assert legend_places(panels, (100, 100), (95, 95), 5) == []
+    assert len(legend_places(panels, (400, 100), (95, 95), 5)) == 2
+    assert [place[1:] for place in legend_places(panels, (100, 200), (95, 95), 5)] == [(5, 155), (5, 110)]
