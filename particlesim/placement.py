@@ -127,7 +127,11 @@ def _on_lattice(
 ) -> np.ndarray:
     """Lattice points, jittered within the gaps that particles of extent ``room`` (3,) leave."""
     lower, upper = _bounds(lattice.region, world)
-    points, spacing = lattice_points(lower, upper, count, lattice.spacing) if count else (np.zeros((0, 3)), 1.0)
+    points, spacing = np.zeros((0, 3)), 1.0
+    if count and _is_round(lattice.region):
+        points, spacing = _round_lattice(lower, upper, count, lattice.spacing, room)
+    elif count:
+        points, spacing = lattice_points(lower, upper, count, lattice.spacing)
     if len(points) < count:
         message = f"makes a lattice of {len(points):,} points here, for {count:,} particles"
         raise SceneError(message, f"particles[{g}].placement.spacing", lattice.spacing)
@@ -138,6 +142,31 @@ def _on_lattice(
             raise SceneError(message, f"particles[{g}].count", count)
         raise SceneError(f"too tight: {span}", f"particles[{g}].placement.spacing", lattice.spacing)
     return points + random.uniform(-0.5, 0.5, points.shape) * (lattice.jitter * (spacing - room))
+
+
+def _round_lattice(
+    lower: np.ndarray, upper: np.ndarray, count: int, spacing: float | None, room: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """As ``lattice_points``, but those nearest to the middle of the ellipsoid in a box; particles span ``room`` (3,)."""
+    edges = upper - lower
+    tried = spacing or float((np.pi / 6.0 * edges.prod() / count) ** (1.0 / 3.0))
+    while True:
+        points, _ = lattice_points(lower, upper, np.iinfo(np.int64).max, tried)
+        distance = _from_middle(points, lower + 0.5 * room, upper - 0.5 * room)
+        inside = np.argsort(distance, kind="stable")[: min(count, int(np.count_nonzero(distance <= 1.0)))]
+        if len(inside) == count or spacing is not None or tried < 0.5 * edges.min() / count:
+            return points[np.sort(inside)], tried
+        tried *= 0.995
+
+
+def _is_round(region: Region | None) -> bool:
+    return region is not None and region.form == "ellipsoid"
+
+
+def _from_middle(points: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Distance of points (m, 3) from the middle of a box, 1 on the ellipsoid that just fits into it."""
+    half = np.maximum(0.5 * (upper - lower), np.finfo(float).tiny)
+    return np.linalg.norm((points - 0.5 * (lower + upper)) / half, axis=-1)
 
 
 def _centres(
@@ -182,15 +211,19 @@ class _Trials:
         lower, upper = self._lower[who], self._upper[who]
         if (lower > upper).any():
             raise SceneError("too large: there are particles wider than the region they are placed in", self._key)
-        if isinstance(self._where, RandomPlacement):
-            return self._random.uniform(lower, upper)
-        around = self._centres[who % len(self._centres)]
-        points = around + self._where.spread * self._random.normal(size=(len(who), 3))
+        points = self._proposed(who, lower, upper)
         # What falls outside is drawn again, so that the blob is cut off rather than piled up at the wall.
         for _ in range(100):
             outside = ((points < lower) | (points > upper)).any(axis=1)
+            if _is_round(self._where.region):
+                outside |= _from_middle(points, lower, upper) > 1.0
             if not outside.any():
                 break
-            again = around[outside] + self._where.spread * self._random.normal(size=(outside.sum(), 3))
-            points[outside] = again
+            points[outside] = self._proposed(who[outside], lower[outside], upper[outside])
         return np.clip(points, lower, upper)
+
+    def _proposed(self, who: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+        if isinstance(self._where, RandomPlacement):
+            return self._random.uniform(lower, upper)
+        around = self._centres[who % len(self._centres)]
+        return around + self._where.spread * self._random.normal(size=(len(who), 3))

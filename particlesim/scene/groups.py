@@ -114,10 +114,11 @@ Size = Annotated[
 
 
 class Region(Model):
-    """A part of the world, from one corner to the opposite one [m]."""
+    """A part of the world, from one corner to the opposite one [m]: that box, or the ellipsoid that just fits in."""
 
     lower: Vector
     upper: Vector
+    form: Literal["box", "ellipsoid"] = "box"
 
     @model_validator(mode="after")
     def _ordered(self) -> Region:
