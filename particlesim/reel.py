@@ -60,7 +60,7 @@ def reel_until(time: float, source: Scene | Trajectory, threads: int | None, pro
         nearest = _nearest(source, time)
         return reel_of(source, range(nearest, nearest + 1), threads, progress)
     simulation = start(source, threads, progress)
-    before = int(time * source.movie.fps) + 1
+    before = source.frame_at(time) + 1
 
     def frames() -> Iterator[tuple[int, Frame]]:
         yield from frames_of(simulation, before)
@@ -89,7 +89,7 @@ def frames_of(simulation: Simulation, total: int) -> Iterator[tuple[int, Frame]]
     """The first frames of a scene and their numbers: at time zero and at every tick of its movie."""
     yield 0, simulation.frame()
     for k in range(1, total):
-        simulation.run_until(k / simulation.scene.movie.fps)
+        simulation.run_until(simulation.scene.time_of(k))
         yield k, simulation.frame()
 
 

@@ -52,7 +52,7 @@ def test_fixed_camera_fits_the_world_tightly_and_centred(aspect, size, elevation
 
 
 @pytest.mark.parametrize("aspect", [9 / 16, 16 / 9])
-@pytest.mark.parametrize("target", [(0.0, 0.0, 0.0), (1.0, -2.0, 0.5)])
+@pytest.mark.parametrize("target", [None, (0.0, 0.0, 0.0), (1.0, -2.0, 0.5)])
 def test_orbit_fits_the_world_at_every_angle(aspect, target):
     orbit = scene({"kind": "orbit", "period": 8.0, "target": target})
     reach = []
@@ -62,6 +62,15 @@ def test_orbit_fits_the_world_at_every_angle(aspect, target):
         reach.append(np.abs(place).max())
     assert max(reach) <= FILL + 1e-3
     assert max(reach) > 0.9 * FILL
+
+
+def test_an_orbit_without_a_target_leaves_equal_margins_above_and_below():
+    orbit = scene({"kind": "orbit", "period": 8.0, "elevation": 30.0})
+    places = [
+        project(view_at(orbit, time, 3.0), 3.0, corners(orbit.world.size))[0][:, 1]
+        for time in np.linspace(0.0, 8.0, 97)
+    ]
+    assert np.max(places) == pytest.approx(-np.min(places), abs=2e-3)
 
 
 def test_orbit_turns_once_in_its_period_at_the_distance_given():

@@ -136,6 +136,13 @@ def test_the_first_frame_is_at_zero_and_the_last_at_the_end():
     assert scene.frames == 61
 
 
+def test_a_slow_movie_has_more_frames_of_the_same_time():
+    table = {"world": {"size": [1, 1, 1]}, "particles": [{"shape": "sphere", "count": 0}], "duration": 2.0}
+    slow = Scene(**table, movie={"fps": 25, "speed": 0.1})
+    assert (slow.frames, slow.time_of(250), slow.frame_at(1.0), slow.frame_at(1.003)) == (501, 1.0, 250, 250)
+    assert (Scene(**table).time_of(7), Scene(**table).frame_at(7 / 30)) == (7 / 30, 7)
+
+
 def test_the_quality_settles_the_resolution_unless_that_is_given():
     table = {"world": {"size": [1, 1, 1]}, "particles": [{"shape": "sphere", "count": 0}]}
     sizes = {quality: Scene(**table, movie={"quality": quality}).movie.size for quality in ("draft", "normal", "high")}
