@@ -90,6 +90,13 @@ def test_a_slow_movie_shows_the_same_motion(tmp_path):
             assert slow[2 * k].position == pytest.approx(usual[k].position, abs=1e-6)
 
 
+@pytest.mark.parametrize("frames", [range(0), range(3, 7), range(-1, 2)])
+def test_frames_that_are_not_there_are_refused(frames, tmp_path):
+    with pytest.raises(ValueError, match="frames must be some of 0 to 5, not range"):
+        ps.render(gas(1, **SMALL), tmp_path / "movie.mp4", frames=frames)
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_summary_adds_up(tmp_path):
     summary = ps.simulate(gas(5, gravity=(0, 0, -3), **SMALL), tmp_path / "run.gsd")
     assert summary.frames == 6

@@ -35,6 +35,7 @@ density = 500
 velocity = [1, 0, 0]
 spin = "rest"
 colour = "by_speed"
+colour_range = [0, 3]
 
 [[particles]]
 name = "two"
@@ -66,8 +67,16 @@ fps = 25
 resolution = [640, 480]
 background = "white"
 
+speed = 0.5
+quality = "high"
+fade = 0.2
+crf = 28
+
 [show]
 cells = true
+box = true
+legend = true
+readout = ["time", "broad phases"]
 """
 
 
