@@ -33,6 +33,10 @@ def scene(*colours, gravity=(0.0, 0.0, 0.0), boundary="wall", span=None):
     return Scene(world=world, particles=groups)
 
 
+def of_all(colours, frame):
+    return colours(frame, np.arange(len(frame.position)))
+
+
 def test_each_shape_keeps_its_colour_whatever_else_is_there():
     alone = shape_colours(header(["cube"], [0]))
     among = shape_colours(header(["sphere", "cube", "pyramid"], [0, 1, 2]))
@@ -49,7 +53,7 @@ def test_more_shapes_than_colours_still_have_one_each():
 def test_groups_and_names():
     some = scene("by_group", "by_group", "#804020", "steelblue")
     colours = ParticleColours(some, header(["sphere"], [0] * 5, [0, 1, 2, 3, 0]), frame(np.zeros((5, 3))))
-    rgb = colours(frame(np.zeros((5, 3))))
+    rgb = of_all(colours, frame(np.zeros((5, 3))))
     assert rgb.dtype == np.float32
     assert rgb[0] == pytest.approx(parse(PALETTE[0])) and np.array_equal(rgb[0], rgb[4])
     assert rgb[1] == pytest.approx(parse(PALETTE[1]))
@@ -61,8 +65,8 @@ def test_speed_colours_grow_lighter_and_their_scale_stays():
     moving = scene("by_speed", "red")
     first = frame([[1.0, 0, 0], [0, 0, 0], [0, 1.0, 0]])
     colours = ParticleColours(moving, header(["sphere"], [0, 0, 0], [0, 1, 0]), first)
-    before = colours(first).copy()
-    faster = colours(frame([[2.0, 0, 0], [9.0, 0, 0], [0, 1.0, 0]])).copy()
+    before = of_all(colours, first).copy()
+    faster = of_all(colours, frame([[2.0, 0, 0], [9.0, 0, 0], [0, 1.0, 0]])).copy()
     assert faster[0].sum() > before[0].sum()
     assert np.array_equal(before[2], faster[2])
     assert np.array_equal(before[1], faster[1])
@@ -74,9 +78,9 @@ def test_speed_colours_of_particles_that_start_at_rest():
     rest = frame(np.zeros((1, 3)))
     for gravity in ((0.0, 0.0, 0.0), (0.0, 0.0, -9.81)):
         colours = ParticleColours(scene("by_speed", gravity=gravity), header(["sphere"], [0]), rest)
-        still = colours(rest).copy()
+        still = of_all(colours, rest).copy()
         assert np.all(np.isfinite(still))
-        assert not np.array_equal(still, colours(frame([[0.5, 0.0, 0.0]])))
+        assert not np.array_equal(still, of_all(colours, frame([[0.5, 0.0, 0.0]])))
 
 
 def test_each_field_colours_its_own_groups():
@@ -87,7 +91,7 @@ def test_each_field_colours_its_own_groups():
     start.position[:, 2] = -2.0, 2.0, 0.0, 0.0, 0.0
     colours = ParticleColours(mixed, head, start)
     assert [field.name for field in colours.fields] == ["height", "size"]
-    rgb = np.sqrt(colours(start))
+    rgb = np.sqrt(of_all(colours, start))
     assert rgb[:2] == pytest.approx(map_colours(np.array([0.0, 1.0])), abs=1e-6)
     # All sizes are on one scale, also those of groups coloured otherwise.
     assert rgb[2:4] == pytest.approx(map_colours(np.array([1.0, 2.0]) / 3.0), abs=1e-6)

@@ -41,18 +41,21 @@ class ParticleColours:
 
     def __init__(self, scene: Scene, header: Header, first: Frame) -> None:
         self._header = header
-        self._colours = _fixed_colours(scene, header)
-        colour_of = np.array([group.colour for group in scene.particles])[header.group]
-        members = {kind: np.flatnonzero(colour_of == kind) for kind in FIELDS}
-        self._members = [of_kind for of_kind in members.values() if len(of_kind)]
-        self.fields = [field_of(kind, scene, header, first) for kind, of_kind in members.items() if len(of_kind)]
+        self._fixed = _fixed_colours(scene, header)
+        kinds = [kind for kind in FIELDS if any(group.colour == kind for group in scene.particles)]
+        self.fields = [field_of(kind, scene, header, first) for kind in kinds]
+        # Which of the fields a particle is coloured by, or -1.
+        number = {kind: k for k, kind in enumerate(kinds)}
+        self._field = np.array([number.get(group.colour, -1) for group in scene.particles])[header.group]
 
-    def __call__(self, frame: Frame) -> np.ndarray:
-        """Linear RGB of every particle, (n, 3) float32. The array is used again for the next frame."""
-        for field, members in zip(self.fields, self._members, strict=True):
-            fraction = field.fractions(self._header, frame)[members]
-            self._colours[members] = map_colours(fraction) ** 2
-        return self._colours
+    def __call__(self, frame: Frame, members: np.ndarray) -> np.ndarray:
+        """Linear RGB (k, 3) float32 of the particles ``members`` (k,)."""
+        colours = self._fixed[members]
+        for number, field in enumerate(self.fields):
+            mine = self._field[members] == number
+            fraction = field.fractions(self._header, frame, members[mine])
+            colours[mine] = _LINEAR[np.clip(np.rint(fraction * (len(_LINEAR) - 1)), 0, len(_LINEAR) - 1).astype(int)]
+        return colours
 
 
 def map_colours(fraction: np.ndarray) -> np.ndarray:
@@ -60,6 +63,10 @@ def map_colours(fraction: np.ndarray) -> np.ndarray:
     anchors = np.array([encoded(colour) for colour in _FIELD_MAP])
     place = np.linspace(0.0, 1.0, len(anchors))
     return np.column_stack([np.interp(fraction, place, channel) for channel in anchors.T])
+
+
+# The map in linear light, fine enough that no step of 8 bits is left out.
+_LINEAR = (map_colours(np.linspace(0.0, 1.0, 1024)) ** 2).astype(np.float32)
 
 
 def shape_colours(header: Header) -> np.ndarray:

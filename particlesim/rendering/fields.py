@@ -25,11 +25,11 @@ class Field(NamedTuple):
     unit: str
     low: float
     high: float
-    values: Callable[[Header, Frame], np.ndarray]  # of all particles, (n,)
+    values: Callable[[Header, Frame, np.ndarray], np.ndarray]  # of some particles
 
-    def fractions(self, header: Header, frame: Frame) -> np.ndarray:
-        """Where on the scale the particles are, (n,), 0 at its low end and 1 at its high one."""
-        return (self.values(header, frame) - self.low) / (self.high - self.low)
+    def fractions(self, header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
+        """Where on the scale the particles ``members`` (k,) are, (k,), 0 at its low end and 1 at its high one."""
+        return (self.values(header, frame, members) - self.low) / (self.high - self.low)
 
 
 def field_of(kind: str, scene: Scene, header: Header, first: Frame) -> Field:
@@ -63,8 +63,8 @@ def _count(low: float, high: float, step: float) -> int:
     return math.floor(high / step + 1e-9) - math.ceil(low / step - 1e-9) + 1
 
 
-def _speeds(header: Header, frame: Frame) -> np.ndarray:
-    return np.linalg.norm(frame.velocity, axis=1)
+def _speeds(header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(frame.velocity[members], axis=1)
 
 
 def _speed_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, float]:
@@ -74,8 +74,8 @@ def _speed_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, flo
     return 0.0, float(np.sqrt(4.0 * mean_square + 2.0 * fall)) or 1.0
 
 
-def _heights(header: Header, frame: Frame) -> np.ndarray:
-    return frame.position[:, 2]
+def _heights(header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
+    return frame.position[members, 2]
 
 
 def _height_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, float]:
@@ -85,8 +85,8 @@ def _height_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, fl
     return float(first.position[:, 2].min()), float(first.position[:, 2].max())
 
 
-def _sizes(header: Header, frame: Frame) -> np.ndarray:
-    return header.size
+def _sizes(header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
+    return header.size[members]
 
 
 def _size_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, float]:

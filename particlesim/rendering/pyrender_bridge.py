@@ -34,9 +34,9 @@ from pyrender.shader_program import ShaderProgram  # noqa: E402
 
 _SHADERS = Path(__file__).with_name("shaders")
 _FLOAT = 4  # bytes
-_SAMPLES = 4  # a pixel; what the sphere shader's mask is written for
-_SHADOW_SHARE = 1.2  # edge of the shadow map, in heights of the picture: a texel is then about as large as a pixel
-_VIEW_BLOCK = 0  # binding point of the uniform block that all programs share
+# Binding points, as the shaders have them: texture units, and that of the uniform block.
+_SHADOW_MAP, _OWNER, _SPHERES, _GROUND = gl.GL_TEXTURE0, gl.GL_TEXTURE1, gl.GL_TEXTURE2, gl.GL_TEXTURE3
+_VIEW_BLOCK = 0  # binding point of the uniform block shared by all
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,13 @@ class Kind:
     vertex: tuple[int, ...]  # floats of each vertex attribute, the first three being a place
     instance: tuple[int, ...]  # floats of each instance attribute
     mode: int = gl.GL_TRIANGLES
-    shadow: bool = False  # casts one
-    cull: bool = False  # only faces towards the camera are drawn, only those away from the light cast a shadow
+    cull: bool = False  # only faces towards the camera are drawn
     blend: bool = False  # lets through what is behind it, and hides nothing
 
 
-SPHERE = Kind("sphere", (3,), (4, 3), gl.GL_TRIANGLE_STRIP, shadow=True)
-HULL = Kind("hull", (3, 3, 4), (4, 4, 3), shadow=True, cull=True)
+# Tiles of the picture in which the canvas shades the spheres that were found at its pixels.
+SPHERES = Kind("sphere", (3,), (2,), gl.GL_TRIANGLE_STRIP)
+HULL = Kind("hull", (3, 3, 4), (4, 4, 4), cull=True)
 FLOOR = Kind("floor", (3,), (), gl.GL_TRIANGLE_STRIP)
 LINE = Kind("line", (3,), (4, 3, 4), gl.GL_TRIANGLE_STRIP, blend=True)
 
@@ -71,16 +71,11 @@ class Layer(pyrender.Primitive):
         self._order = np.ascontiguousarray(order, dtype=np.uint32).ravel()
         self._vertices = np.ascontiguousarray(vertices, dtype=np.float32)
         self._rows = np.zeros((0 if kind.instance else 1, sum(kind.instance)), dtype=np.float32)
-        self.visible = len(self._rows)
         self._stale = False
 
-    def put(self, rows: np.ndarray, visible: int | None = None) -> None:
-        """Replace the instances: (n, sum of kind.instance) float32. They reach the GPU with the next drawing.
-
-        Only the first ``visible`` are in the picture; the others cast shadows all the same.
-        """
+    def put(self, rows: np.ndarray) -> None:
+        """Replace the instances: (n, sum of kind.instance) float32. They reach the GPU with the next drawing."""
         self._rows = np.ascontiguousarray(rows, dtype=np.float32)
-        self.visible = len(self._rows) if visible is None else visible
         self._stale = True
 
     @property
@@ -88,16 +83,17 @@ class Layer(pyrender.Primitive):
         """How many instances there are."""
         return len(self._rows)
 
-    def draw(self, count: int) -> None:
-        """Draw the first ``count`` instances with the program in use."""
-        if not count:
+    def draw(self) -> None:
+        """Draw the instances with the program in use."""
+        if not self.count:
             return
         self._bind()
         if self._stale:
             gl.glBindBuffer(gl.GL_ARRAY_BUFFER, self._buffers[1])
             gl.glBufferData(gl.GL_ARRAY_BUFFER, self._rows.nbytes, self._rows, gl.GL_STREAM_DRAW)
             self._stale = False
-        gl.glDrawElementsInstanced(self.kind.mode, len(self._order), gl.GL_UNSIGNED_INT, ctypes.c_void_p(0), count)
+        order, none = len(self._order), ctypes.c_void_p(0)
+        gl.glDrawElementsInstanced(self.kind.mode, order, gl.GL_UNSIGNED_INT, none, self.count)
         self._unbind()
 
     def _add_to_context(self) -> None:
@@ -126,7 +122,7 @@ class Layer(pyrender.Primitive):
 
 
 class Program(ShaderProgram):
-    """A shader program whose files may include others, and which takes its uniforms from the shared block."""
+    """A shader program whose files may include others."""
 
     def _load(self, shader_filename: str) -> str:
         def included(match: re.Match[str]) -> str:
@@ -135,52 +131,48 @@ class Program(ShaderProgram):
         source = Path(shader_filename).read_text(encoding="utf-8")
         return re.sub(r'^#include "(.+)"$', included, source, flags=re.MULTILINE)
 
-    def _add_to_context(self) -> None:
-        super()._add_to_context()
-        block = gl.glGetUniformBlockIndex(self._program_id, "View")
-        gl.glUniformBlockBinding(self._program_id, block, _VIEW_BLOCK)
 
+@dataclass(frozen=True)
+class Picture:
+    """What a picture is made of besides the layers. The first rows of both maps are the lowest.
 
-class _KeyLight(pyrender.DirectionalLight):
-    """The light that casts shadows, with a map that is looked up between its texels."""
+    ``view_block``: the uniform block of shaders/common.glsl; ``shadow`` (h, w) float32, 0 .. 1: the shadow map,
+    how deep light goes in its box; ``owner`` (height, width) int32: number of the sphere at each pixel, or -1;
+    ``spheres`` (k, 8) float32: centre [m], radius [m], linear colour and share of the sky's light; ``ground`` (b, a)
+    float32: share of the sky's light that reaches the floor, from its corner (-x, -y) to (x, y).
+    """
 
-    def __init__(self, pixels: int) -> None:
-        super().__init__()
-        self.pixels = pixels
-
-    def _generate_shadow_texture(self, size: int | None = None) -> None:
-        smooth = pyrender.Sampler(
-            magFilter=gl.GL_LINEAR,
-            minFilter=gl.GL_LINEAR,
-            wrapS=gl.GL_CLAMP_TO_BORDER,
-            wrapT=gl.GL_CLAMP_TO_BORDER,
-        )
-        self.shadow_texture = pyrender.Texture(
-            sampler=smooth,
-            source_channels="D",
-            data_format=gl.GL_FLOAT,
-            width=self.pixels,
-            height=self.pixels,
-        )
+    view_block: np.ndarray
+    shadow: np.ndarray
+    owner: np.ndarray
+    spheres: np.ndarray
+    ground: np.ndarray
 
 
 class _Renderer(pyrender.Renderer):
-    """Draws the layers of a scene: shadow map, then one picture of four samples a pixel."""
+    """Draws the layers of a scene, ``samples`` by ``samples`` to a pixel."""
 
-    _main_fb: int | None
-    _main_fb_ms: int | None
+    picture: Picture
 
-    def __init__(self, width: int, height: int) -> None:
-        super().__init__(width, height)
+    def __init__(self, size: tuple[int, int], samples: int) -> None:
+        super().__init__(samples * size[0], samples * size[1])
         self._programs: dict[str, Program] = {}
-        self._block = gl.glGenBuffers(1)
-        self.view_block = np.zeros(0, dtype=np.float32)
+        self._block, self._table = (int(buffer) for buffer in gl.glGenBuffers(2))
+        self._drawn = _Target(samples * size[0], samples * size[1], depth=True)
+        self._final = self._drawn if samples == 1 else _Target(*size, depth=False)
+        self._spheres = int(gl.glGenTextures(1))
+        self._shadow, self._ground = _texture(gl.GL_LINEAR), _texture(gl.GL_LINEAR)
+        gl.glBindTexture(gl.GL_TEXTURE_2D, self._shadow)
+        gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_COMPARE_MODE, gl.GL_COMPARE_REF_TO_TEXTURE)
+        self._owner = _texture(gl.GL_NEAREST)
+        gl.glBindBuffer(gl.GL_TEXTURE_BUFFER, self._table)
+        gl.glBindTexture(gl.GL_TEXTURE_BUFFER, self._spheres)
+        gl.glTexBuffer(gl.GL_TEXTURE_BUFFER, gl.GL_RGBA32F, self._table)
 
     def render(self, scene: pyrender.Scene, flags: int, seg_node_map: Any = None) -> np.ndarray:
+        block = np.ascontiguousarray(self.picture.view_block)
         gl.glBindBufferBase(gl.GL_UNIFORM_BUFFER, _VIEW_BLOCK, self._block)
-        gl.glBufferData(
-            gl.GL_UNIFORM_BUFFER, self.view_block.nbytes, np.ascontiguousarray(self.view_block), gl.GL_STREAM_DRAW
-        )
+        gl.glBufferData(gl.GL_UNIFORM_BUFFER, block.nbytes, block, gl.GL_STREAM_DRAW)
         return super().render(scene, flags, seg_node_map)
 
     def __del__(self) -> None:
@@ -193,127 +185,129 @@ class _Renderer(pyrender.Renderer):
             self._programs[name]._add_to_context()
         self._programs[name]._bind()
 
-    def _shadow_mapping_pass(self, scene: pyrender.Scene, light_node: Any, flags: int) -> None:
-        texture = light_node.light.shadow_texture
-        self._configure_shadow_framebuffer()
-        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, self._shadow_fb)
-        texture._bind()
-        gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_COMPARE_MODE, gl.GL_COMPARE_REF_TO_TEXTURE)
-        texture._bind_as_depth_attachment()
-        gl.glDrawBuffer(gl.GL_NONE)
-        gl.glReadBuffer(gl.GL_NONE)
-        gl.glViewport(0, 0, light_node.light.pixels, light_node.light.pixels)
+    def _forward_pass(self, scene: pyrender.Scene, flags: int, seg_node_map: Any = None) -> np.ndarray:
+        picture = self.picture
+        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, self._drawn.framebuffer)
+        gl.glViewport(0, 0, self._drawn.width, self._drawn.height)
         gl.glEnable(gl.GL_DEPTH_TEST)
         gl.glDepthMask(gl.GL_TRUE)
-        gl.glDisable(gl.GL_BLEND)
-        # What has left the box of the map towards the light casts its shadow all the same.
-        gl.glEnable(gl.GL_DEPTH_CLAMP)
-        gl.glClear(gl.GL_DEPTH_BUFFER_BIT)
-        for layer in _layers(scene):
-            if layer.kind.shadow:
-                self._use(f"{layer.kind.name}_shadow")
-                self._cull(layer.kind.cull, gl.GL_FRONT)
-                layer.draw(layer.count)
-
-    def _forward_pass(self, scene: pyrender.Scene, flags: int, seg_node_map: Any = None) -> np.ndarray:
-        self._configure_forward_pass_viewport(flags)
-        gl.glEnable(gl.GL_MULTISAMPLE)
-        gl.glDisable(gl.GL_DEPTH_CLAMP)
         gl.glClearColor(*scene.bg_color)
         gl.glClear(gl.GL_COLOR_BUFFER_BIT | gl.GL_DEPTH_BUFFER_BIT)
         gl.glBlendFunc(gl.GL_SRC_ALPHA, gl.GL_ONE_MINUS_SRC_ALPHA)
-        for light in scene.lights:
-            gl.glActiveTexture(gl.GL_TEXTURE0)
-            light.shadow_texture._bind()
-        for layer in _layers(scene):
-            self._use(layer.kind.name)
-            self._cull(layer.kind.cull, gl.GL_BACK)
-            (gl.glEnable if layer.kind.blend else gl.glDisable)(gl.GL_BLEND)
-            gl.glDepthMask(not layer.kind.blend)
-            layer.draw(layer.visible)
+        self._bind_spheres()
+        _fill(_SHADOW_MAP, self._shadow, gl.GL_DEPTH_COMPONENT32F, gl.GL_DEPTH_COMPONENT, gl.GL_FLOAT, picture.shadow)
+        _fill(_OWNER, self._owner, gl.GL_R32I, gl.GL_RED_INTEGER, gl.GL_INT, picture.owner)
+        _fill(_GROUND, self._ground, gl.GL_R32F, gl.GL_RED, gl.GL_FLOAT, picture.ground)
+        self._draw_layers(scene)
         return self._read_main_framebuffer(scene, flags)
 
-    @staticmethod
-    def _cull(wanted: bool, side: int) -> None:
-        (gl.glEnable if wanted else gl.glDisable)(gl.GL_CULL_FACE)
-        gl.glCullFace(side)
+    def _bind_spheres(self) -> None:
+        spheres = np.ascontiguousarray(self.picture.spheres)
+        gl.glActiveTexture(_SPHERES)
+        gl.glBindTexture(gl.GL_TEXTURE_BUFFER, self._spheres)
+        gl.glBindBuffer(gl.GL_TEXTURE_BUFFER, self._table)
+        gl.glBufferData(gl.GL_TEXTURE_BUFFER, spheres.nbytes, spheres, gl.GL_STREAM_DRAW)
 
-    def _configure_main_framebuffer(self) -> None:
-        if self._main_fb is not None:
-            return
-        size = self.viewport_width, self.viewport_height
-        self._main_cb, self._main_cb_ms, self._main_db_ms = (int(b) for b in gl.glGenRenderbuffers(3))
-        self._main_db = 0
-        plain, multisampled = (int(f) for f in gl.glGenFramebuffers(2))
-        self._main_fb, self._main_fb_ms = plain, multisampled
-        self._attach(plain, gl.GL_COLOR_ATTACHMENT0, self._main_cb, gl.GL_RGBA8, 0)
-        self._attach(multisampled, gl.GL_COLOR_ATTACHMENT0, self._main_cb_ms, gl.GL_RGBA8, _SAMPLES)
-        self._attach(multisampled, gl.GL_DEPTH_ATTACHMENT, self._main_db_ms, gl.GL_DEPTH_COMPONENT24, _SAMPLES)
-        if gl.glCheckFramebufferStatus(gl.GL_FRAMEBUFFER) != gl.GL_FRAMEBUFFER_COMPLETE:
-            raise ValueError(f"no frame buffer with {_SAMPLES} samples a pixel")
-        self._main_fb_dims = size
-
-    def _attach(self, framebuffer: int, point: int, buffer: int, form: int, samples: int) -> None:
-        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, framebuffer)
-        gl.glBindRenderbuffer(gl.GL_RENDERBUFFER, buffer)
-        gl.glRenderbufferStorageMultisample(
-            gl.GL_RENDERBUFFER, samples, form, self.viewport_width, self.viewport_height
-        )
-        gl.glFramebufferRenderbuffer(gl.GL_FRAMEBUFFER, point, gl.GL_RENDERBUFFER, buffer)
+    def _draw_layers(self, scene: pyrender.Scene) -> None:
+        for layer in (layer for mesh in scene.meshes for layer in mesh.primitives):
+            kind = layer.kind
+            self._use(kind.name)
+            (gl.glEnable if kind.cull else gl.glDisable)(gl.GL_CULL_FACE)
+            (gl.glEnable if kind.blend else gl.glDisable)(gl.GL_BLEND)
+            gl.glDepthMask(not kind.blend)
+            layer.draw()
 
     def _read_main_framebuffer(self, scene: pyrender.Scene, flags: int) -> np.ndarray:
-        width, height = self._main_fb_dims
-        gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, self._main_fb_ms)
-        gl.glBindFramebuffer(gl.GL_DRAW_FRAMEBUFFER, self._main_fb)
-        gl.glBlitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.GL_COLOR_BUFFER_BIT, gl.GL_NEAREST)
-        gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, self._main_fb)
-        gl.glPixelStorei(gl.GL_PACK_ALIGNMENT, 1)
-        image = np.empty((height, width, 3), dtype=np.uint8)
-        gl.glReadPixels(0, 0, width, height, gl.GL_RGB, gl.GL_UNSIGNED_BYTE, image)
-        # OpenGL's first row is the lowest.
-        return np.ascontiguousarray(image[::-1])
+        drawn, final = self._drawn, self._final
+        gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, drawn.framebuffer)
+        if final is not drawn:
+            # At two samples a side, looking up half way between them gives their mean exactly.
+            gl.glBindFramebuffer(gl.GL_DRAW_FRAMEBUFFER, final.framebuffer)
+            whole, target = (0, 0, drawn.width, drawn.height), (0, 0, final.width, final.height)
+            gl.glBlitFramebuffer(*whole, *target, gl.GL_COLOR_BUFFER_BIT, gl.GL_LINEAR)
+            gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, final.framebuffer)
+        # Four bytes a pixel, as they are stored: OpenGL takes longer to leave one out than numpy does.
+        image = np.empty((final.height, final.width, 4), dtype=np.uint8)
+        gl.glReadPixels(0, 0, final.width, final.height, gl.GL_RGBA, gl.GL_UNSIGNED_BYTE, image)
+        return image
+
+
+def _texture(look_up: int) -> int:
+    """A map of a plane, 1 beyond its edges."""
+    texture = int(gl.glGenTextures(1))
+    gl.glBindTexture(gl.GL_TEXTURE_2D, texture)
+    gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_MIN_FILTER, look_up)
+    gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_MAG_FILTER, look_up)
+    gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_WRAP_S, gl.GL_CLAMP_TO_BORDER)
+    gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_WRAP_T, gl.GL_CLAMP_TO_BORDER)
+    gl.glTexParameterfv(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_BORDER_COLOR, np.ones(4, dtype=np.float32))
+    return texture
+
+
+def _fill(unit: int, texture: int, form: int, channels: int, number: int, values: np.ndarray) -> None:
+    """Put ``values`` (height, width) into a texture, and that on its unit."""
+    height, width = values.shape
+    gl.glActiveTexture(unit)
+    gl.glBindTexture(gl.GL_TEXTURE_2D, texture)
+    gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, form, width, height, 0, channels, number, np.ascontiguousarray(values))
+
+
+class _Target:
+    """A frame buffer of 8 bits a channel."""
+
+    def __init__(self, width: int, height: int, depth: bool) -> None:
+        self.width, self.height = width, height
+        self.framebuffer = gl.glGenFramebuffers(1)
+        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, self.framebuffer)
+        self._attach(gl.GL_COLOR_ATTACHMENT0, gl.GL_RGBA8)
+        if depth:
+            self._attach(gl.GL_DEPTH_ATTACHMENT, gl.GL_DEPTH_COMPONENT24)
+        if gl.glCheckFramebufferStatus(gl.GL_FRAMEBUFFER) != gl.GL_FRAMEBUFFER_COMPLETE:
+            raise ValueError(f"no frame buffer of {width} x {height} pixels")
+
+    def _attach(self, point: int, form: int) -> None:
+        buffer = gl.glGenRenderbuffers(1)
+        gl.glBindRenderbuffer(gl.GL_RENDERBUFFER, buffer)
+        gl.glRenderbufferStorage(gl.GL_RENDERBUFFER, form, self.width, self.height)
+        gl.glFramebufferRenderbuffer(gl.GL_FRAMEBUFFER, point, gl.GL_RENDERBUFFER, buffer)
 
 
 class Canvas:
-    """An off-screen picture of the given layers, drawn in their order. Close it when done."""
+    """An off-screen picture of the given layers, drawn in their order. Close it when done.
 
-    def __init__(self, platform: Platform, size: tuple[int, int], layers: Sequence[Layer], background: np.ndarray):
+    ``samples``: squares a side that each pixel is the mean of, 1 or 2.
+    """
+
+    def __init__(
+        self,
+        platform: Platform,
+        size: tuple[int, int],
+        layers: Sequence[Layer],
+        background: np.ndarray,
+        samples: int,
+    ) -> None:
         self._scene = pyrender.Scene(bg_color=[*background, 1.0])
         self._scene.add(pyrender.Mesh(list(layers)))
-        self.shadow_pixels = round(_SHADOW_SHARE * size[1])
-        self._scene.add(_KeyLight(self.shadow_pixels))
         # pyrender wants a camera; the one that counts comes with each picture, in the uniform block.
         self._scene.add(pyrender.PerspectiveCamera(yfov=1.0))
         try:
             self._context = _context(platform, size)
             self._context.init_context()
             self._context.make_current()
-            self._renderer = _Renderer(*size)
-            self.samples = self._sample_points()
+            self._renderer = _Renderer(size, samples)
         except (AssertionError, OpenGL.error.Error, OSError, ValueError) as error:
             reason = " ".join(str(error).split()) or type(error).__name__
             raise RenderError(f"OpenGL ({platform.renderer}) gives no picture of {size}: {reason}") from error
 
-    def draw(self, view_block: np.ndarray) -> np.ndarray:
-        """The picture, (height, width, 3) uint8 sRGB; ``view_block`` is the uniform block of shaders/common.glsl."""
+    def draw(self, picture: Picture) -> np.ndarray:
+        """The picture, (height, width, 4) uint8 sRGB; as always in OpenGL, its first row is the lowest."""
         self._context.make_current()
-        self._renderer.view_block = view_block
-        return self._renderer.render(self._scene, RenderFlags.OFFSCREEN | RenderFlags.SHADOWS_DIRECTIONAL)
+        self._renderer.picture = picture
+        return self._renderer.render(self._scene, RenderFlags.OFFSCREEN)
 
     def close(self) -> None:
         """Give back the context and what it holds. Other canvases live on: the display is shared and stays."""
         self._context.delete_context()
-
-    def _sample_points(self) -> np.ndarray:
-        """Where a pixel's samples lie, from its centre [pixels], (4, 2)."""
-        self._renderer._configure_main_framebuffer()
-        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, self._renderer._main_fb_ms)
-        points = [gl.glGetMultisamplefv(gl.GL_SAMPLE_POSITION, i, np.zeros(2, np.float32)) for i in range(_SAMPLES)]
-        return np.array(points, dtype=np.float32) - 0.5
-
-
-def _layers(scene: pyrender.Scene) -> list[Layer]:
-    return [layer for mesh in scene.meshes for layer in mesh.primitives]
 
 
 def _context(platform: Platform, size: tuple[int, int]) -> Any:

@@ -1,4 +1,4 @@
-uniform sampler2DShadow shadow_map;
+layout(binding = 0) uniform sampler2DShadow shadow_map;
 
 // The colours of the light, linear. Sky and ground make the light that comes from everywhere.
 const vec3 KEY = vec3(0.86, 0.83, 0.78);
@@ -9,7 +9,8 @@ const vec3 GROUND = vec3(0.21, 0.20, 0.19);
 float lit(vec3 place) {
     // Before its surface by a little, or rounding would cast shadows.
     vec3 at = (shadow_from_eye * vec4(place, 1.0)).xyz - vec3(0.0, 0.0, 6e-4);
-    vec3 aside = vec3(0.6, -0.6, 0.0) * light.w;
+    at.z = min(at.z, 1.0);
+    vec3 aside = vec3(0.6, -0.6, 0.0) * texel.xyz;
     return 0.5 * (texture(shadow_map, at + aside) + texture(shadow_map, at - aside));
 }
 

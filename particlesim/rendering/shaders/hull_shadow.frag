@@ -1,3 +1,0 @@
-#include "common.glsl"
-
-void main() {}
