@@ -53,7 +53,7 @@ def render(
 
     ``look`` draws a trajectory as this scene says, in place of its own; ``frames`` are the numbers of those to draw,
     all if not given: a scene is simulated from its start to the last of them. Errors as for ``simulate``; RenderError
-    if this machine cannot draw or encode.
+    if this machine cannot draw or encode; ValueError for frames that are not there.
     """
     with opened(source) as movable:
         reel = reel_of(movable, frames, threads, progress)

@@ -42,12 +42,15 @@ def opened(source: Scene | Trajectory | str | Path) -> Iterator[Scene | Trajecto
 
 
 def reel_of(source: Scene | Trajectory, wanted: range | None, threads: int | None, progress: Progress | None) -> Reel:
-    """All frames of a scene up to the last wanted one; of a trajectory those alone. None stands for all."""
+    """All frames of a scene up to the last wanted one; of a trajectory those alone. None stands for all.
+
+    ValueError for frames that are not there.
+    """
     if isinstance(source, Trajectory):
-        wanted = wanted or range(len(source))
+        wanted = _among(wanted, len(source))
         stored = ((k, source[k]) for k in wanted)
         return Reel(scene_of(source), source.header, source[0], stored, len(wanted), wanted, "reading")
-    wanted = wanted or range(source.frames)
+    wanted = _among(wanted, source.frames)
     simulation = start(source, threads, progress)
     total = max(wanted) + 1
     frames = frames_of(simulation, total)
@@ -60,7 +63,7 @@ def reel_until(time: float, source: Scene | Trajectory, threads: int | None, pro
         nearest = _nearest(source, time)
         return reel_of(source, range(nearest, nearest + 1), threads, progress)
     simulation = start(source, threads, progress)
-    before = int(time * source.movie.fps) + 1
+    before = source.frame_at(time) + 1
 
     def frames() -> Iterator[tuple[int, Frame]]:
         yield from frames_of(simulation, before)
@@ -89,7 +92,7 @@ def frames_of(simulation: Simulation, total: int) -> Iterator[tuple[int, Frame]]
     """The first frames of a scene and their numbers: at time zero and at every tick of its movie."""
     yield 0, simulation.frame()
     for k in range(1, total):
-        simulation.run_until(k / simulation.scene.movie.fps)
+        simulation.run_until(simulation.scene.time_of(k))
         yield k, simulation.frame()
 
 
@@ -112,6 +115,15 @@ def _compile(scene: Scene) -> None:
         ],
     }
     Simulation(Scene.model_validate(table)).run(duration=0.5)
+
+
+def _among(wanted: range | None, total: int) -> range:
+    """The wanted ones of ``total`` frames. ValueError if there are none, or no such ones."""
+    if wanted is None:
+        return range(total)
+    if not wanted or min(wanted) < 0 or max(wanted) >= total:
+        raise ValueError(f"frames must be some of 0 to {total - 1}, not {wanted}")
+    return wanted
 
 
 def _nearest(trajectory: Trajectory, time: float) -> int:

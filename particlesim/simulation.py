@@ -41,7 +41,7 @@ class Simulation:
             raise ValueError(f"unknown broad phase '{broad_phase}'; there are {', '.join(METHODS)}")
         self._find_pairs = METHODS[broad_phase or chosen.kind]
         self._parameters = chosen.model_dump(exclude={"kind"}) if broad_phase in (None, chosen.kind) else {}
-        self._frame_time = 1.0 / scene.movie.fps
+        self._frame_time = scene.time_of(1)
         self._flight = Flight(self.table, self.world, self.constants, self.state, self._candidate_pairs)
         self.steps = 0
         self.time = 0.0

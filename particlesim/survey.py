@@ -44,6 +44,11 @@ def survey(scene: Scene) -> list[tuple[str, str]]:
         ("broad phase", scene.solver.broad_phase.kind),
         ("time step", f"{step:.3g} s ({chosen}), about {math.ceil(scene.duration / step):,} steps"),
         ("duration", f"{scene.duration:g} s"),
-        ("frames", f"{scene.frames:,} of {width} x {height} at {scene.movie.fps:g} a second"),
+        ("frames", f"{scene.frames:,} of {width} x {height} at {scene.movie.fps:g} a second{_pace(scene.movie.speed)}"),
         ("memory", f"about {(_BYTES_OF_PROCESS + BYTES_PER_PARTICLE * len(c.size) + 30 * pixels) / 1e6:,.0f} MB"),
     ]
+
+
+def _pace(speed: float) -> str:
+    """How fast a movie shows what happens, if not as fast as it does."""
+    return "" if speed == 1.0 else f", {speed:g} times as fast as it happens"

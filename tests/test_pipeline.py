@@ -79,6 +79,24 @@ def test_a_movie_fades_but_its_poster_does_not(tmp_path):
     assert np.abs(255.0 - iio.imread(tmp_path / "movie.png")).mean() == pytest.approx(darkness[2], rel=0.1)
 
 
+def test_a_slow_movie_shows_the_same_motion(tmp_path):
+    settings = {**SMALL, "movie": {**SMALL["movie"], "speed": 0.5}, "duration": 0.2}
+    ps.simulate(gas(5, **settings), tmp_path / "slow.gsd")
+    ps.simulate(gas(5, **{**SMALL, "duration": 0.2}), tmp_path / "usual.gsd")
+    with ps.Trajectory(tmp_path / "slow.gsd") as slow, ps.Trajectory(tmp_path / "usual.gsd") as usual:
+        assert (len(slow), len(usual)) == (5, 3)
+        for k in range(3):
+            assert slow[2 * k].time == usual[k].time
+            assert slow[2 * k].position == pytest.approx(usual[k].position, abs=1e-6)
+
+
+@pytest.mark.parametrize("frames", [range(0), range(3, 7), range(-1, 2)])
+def test_frames_that_are_not_there_are_refused(frames, tmp_path):
+    with pytest.raises(ValueError, match="frames must be some of 0 to 5, not range"):
+        ps.render(gas(1, **SMALL), tmp_path / "movie.mp4", frames=frames)
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_summary_adds_up(tmp_path):
     summary = ps.simulate(gas(5, gravity=(0, 0, -3), **SMALL), tmp_path / "run.gsd")
     assert summary.frames == 6

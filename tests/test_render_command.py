@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 import particlesim as ps
 from particlesim import cli
-from particlesim.scene.change import scaled, with_look
+from particlesim.scene.change import scaled, with_colour, with_look
 from tests.worlds import gas, listed, scene
 
 SCENE = """
@@ -133,6 +133,12 @@ def test_the_look_of_another_scene_is_taken(folder):
     picture = iio.imread("renders/run.png").astype(int)
     assert picture.shape == (360, 640, 3)
     assert ((picture[..., 1] > 2 * picture[..., 0]) & (picture[..., 1] > 80)).sum() > 100
+
+
+def test_a_range_is_forgotten_with_the_field_that_it_was_given_for():
+    one = scene({"shape": "sphere", "count": 3, "colour": "by_speed", "colour_range": (0.0, 2.0)})
+    assert with_colour(one, "by_speed").particles[0].colour_range == (0.0, 2.0)
+    assert with_colour(one, "by_height").particles[0].colour_range is None
 
 
 def test_a_twin_fills_as_much_and_has_the_same_density_energy_and_speeds():

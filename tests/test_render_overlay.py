@@ -69,6 +69,12 @@ def test_the_usual_readout_says_what_the_ledger_knows():
     assert rows_of(make_scene(readout=False), later, first) == []
 
 
+def test_the_time_tells_frames_of_a_slow_movie_apart():
+    slow = make_scene()
+    slow.movie.speed = 0.01
+    assert rows_of(slow, make_frame(time=1 / 3000), make_frame())[0] == ("time", "0.0003 s")
+
+
 def test_rows_come_in_the_order_of_the_list():
     scene = make_scene(readout=["temperature", "speed", "time"])
     frame = make_frame(4, 2.0, velocity=(3.0, 4.0, 0.0), kinetic_translational=60.0)

@@ -35,6 +35,7 @@ density = 500
 velocity = [1, 0, 0]
 spin = "rest"
 colour = "by_speed"
+colour_range = [0, 3]
 
 [[particles]]
 name = "two"
@@ -66,8 +67,16 @@ fps = 25
 resolution = [640, 480]
 background = "white"
 
+speed = 0.5
+quality = "high"
+fade = 0.2
+crf = 28
+
 [show]
 cells = true
+box = true
+legend = true
+readout = ["time", "broad phases"]
 """
 
 
@@ -134,6 +143,13 @@ def test_a_mark_of_the_encoding_is_no_error(tmp_path):
 def test_the_first_frame_is_at_zero_and_the_last_at_the_end():
     scene = parse_scene({"world": {"size": [1, 1, 1]}, "particles": [{"shape": "sphere", "count": 0}], "duration": 2})
     assert scene.frames == 61
+
+
+def test_a_slow_movie_has_more_frames_of_the_same_time():
+    table = {"world": {"size": [1, 1, 1]}, "particles": [{"shape": "sphere", "count": 0}], "duration": 2.0}
+    slow = Scene(**table, movie={"fps": 25, "speed": 0.1})
+    assert (slow.frames, slow.time_of(250), slow.frame_at(1.0), slow.frame_at(1.003)) == (501, 1.0, 250, 250)
+    assert (Scene(**table).time_of(7), Scene(**table).frame_at(7 / 30)) == (7 / 30, 7)
 
 
 def test_the_quality_settles_the_resolution_unless_that_is_given():

@@ -74,7 +74,7 @@ BROKEN = [
     ),
     (
         GOOD + "[movie]\nframerate = 3\n",
-        "movie.framerate = 3: unknown key; allowed: fps, quality, resolution, background, crf, fade",
+        "movie.framerate = 3: unknown key; allowed: fps, speed, quality, resolution, background, crf, fade",
     ),
     (GROUP, "the key 'world' is missing"),
     (WORLD, "the key 'particles' is missing"),
@@ -156,6 +156,7 @@ BROKEN = [
     ),
     (GOOD + "[movie]\nquality = 1\n", "movie.quality = 1: must be 'draft', 'normal' or 'high'"),
     (GOOD + "[movie]\ncrf = 52\n", "movie.crf = 52: must be a whole number from 0 (lossless) to 51 (smallest)"),
+    (GOOD + "[movie]\nspeed = 0\n", "movie.speed = 0: must be a number of seconds above 0"),
     (GOOD + "[movie]\nfade = -1\n", "movie.fade = -1: must be a number of seconds of 0 or more"),
     (GOOD + "[solver]\ntime_step = 0\n", "solver.time_step = 0: must be 'auto' or a number of seconds above 0"),
     (

@@ -121,7 +121,13 @@ def _fixed(camera: FixedCamera, box: Box, slope: np.ndarray) -> np.ndarray:
 def _orbit(camera: OrbitCamera, time: float, box: Box, slope: np.ndarray) -> np.ndarray:
     axes = _axes(camera.azimuth + 360.0 * time / camera.period, camera.elevation)
     target = box.middle if camera.target is None else np.asarray(camera.target)
-    distance = camera.distance or _orbit_distance(camera.elevation, box.corners - target, slope)
+    if camera.distance is not None:
+        return _pose(axes, target + camera.distance * axes[:, 2])
+    seen = _swept(box.corners - target) @ _axes(0.0, camera.elevation)
+    if camera.target is None:
+        # Above or below its middle, so that the margins are equal.
+        return _pose(axes, target + axes @ _stand(seen, slope))
+    distance = float((np.abs(seen[:, :2]) / slope + seen[:, 2:]).max())
     return _pose(axes, target + distance * axes[:, 2])
 
 
@@ -174,28 +180,29 @@ def _looking(position: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 
 def _fitted(axes: np.ndarray, points: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    """The pose nearest to the points that sees them all, with equal margins left and right, above and below.
+    """The pose nearest to the points that sees them all, with equal margins left and right, above and below."""
+    return _pose(axes, axes @ _stand(points @ axes, slope))
 
-    A camera at (a, b, d) in its own axes sees a point (x, y, z) when |x - a| <= slope_x (d - z), and likewise in y.
-    The two sides of each inequality bound d from below by lines in a that rise and fall; they cross at the best a.
+
+def _stand(points: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """Where a camera stands that sees all points (n, 3) and is nearest to them, all in its own axes, (3,).
+
+    A camera at (a, b, d) sees a point (x, y, z) when |x - a| <= slope_x (d - z), and likewise in y. The two sides of
+    each inequality bound d from below by lines in a that rise and fall; they cross at the best a.
     """
-    local = points @ axes
-    rising = (local[:, :2] / slope + local[:, 2:]).max(axis=0)
-    falling = (-local[:, :2] / slope + local[:, 2:]).max(axis=0)
+    rising = (points[:, :2] / slope + points[:, 2:]).max(axis=0)
+    falling = (-points[:, :2] / slope + points[:, 2:]).max(axis=0)
     sideways = 0.5 * slope * (rising - falling)
-    distance = float((0.5 * (rising + falling)).max())
-    return _pose(axes, axes @ np.array([*sideways, distance]))
+    return np.array([*sideways, float((0.5 * (rising + falling)).max())])
 
 
-def _orbit_distance(elevation: float, corners: np.ndarray, slope: np.ndarray) -> float:
-    """The distance from the target at which corners (k, 3) [m] from it stay in the picture all the way round."""
-    # Seen by a camera that circles, a corner runs round a circle about the target's axis.
-    radius = np.hypot(corners[:, 0], corners[:, 1])[:, None]
+def _swept(points: np.ndarray) -> np.ndarray:
+    """Points (n, 3) that turn about the upright axis through the origin, in many places all the way round."""
+    # As seen by a camera that circles.
+    radius = np.hypot(points[:, 0], points[:, 1])[:, None]
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
-    height = np.broadcast_to(corners[:, 2:], (len(corners), len(turn)))
-    swept = np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=-1).reshape(-1, 3)
-    local = swept @ _axes(0.0, elevation)
-    return float((np.abs(local[:, :2]) / slope + local[:, 2:]).max())
+    height = np.broadcast_to(points[:, 2:], (len(points), len(turn)))
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=-1).reshape(-1, 3)
 
 
 def _near(position: np.ndarray, scene: Scene, box: Box) -> float:

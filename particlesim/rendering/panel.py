@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 # little of the picture through.
 _DARK = np.array([[22.0, 25.0, 29.0], [245.0, 245.0, 242.0], [176.0, 180.0, 184.0]])
 _LIGHT = np.array([[252.0, 252.0, 250.0], [24.0, 27.0, 31.0], [96.0, 100.0, 104.0]])
-_OPACITY = 0.82
+_OPACITY = 0.88
 
 # Height of letters as a fraction of the picture's shorter side, and the least [pixels]: below that they run together.
 _TEXT = 0.026

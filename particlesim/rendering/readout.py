@@ -49,7 +49,7 @@ class Readout:
         self._first = first
         self._passed = deque([Moment(first.time, first.ledger)], maxlen=_WINDOW + 1)
         rows: dict[str, Callable[[Frame], Iterator[Row]]] = {
-            "time": _time,
+            "time": self._time,
             "particles": _particles,
             "impacts": _impacts,
             "energy change": self._energy_change,
@@ -66,6 +66,11 @@ class Readout:
         if frame.time > self._passed[-1].time:
             self._passed.append(Moment(frame.time, frame.ledger))
         return [row for rows in self._rows for row in rows(frame)]
+
+    def _time(self, frame: Frame) -> Iterator[Row]:
+        # As many places as tell one frame from the next, and no fewer than two.
+        places = max(2, math.ceil(-math.log10(self._scene.time_of(1))))
+        yield Row("time", f"{frame.time:.{places}f} s")
 
     def _energy_change(self, frame: Frame) -> Iterator[Row]:
         if any(key in frame.ledger for key in _ENERGIES):
@@ -140,10 +145,6 @@ def pressure(scene: Scene, moments: Sequence[Moment]) -> float | None:
         virial = (after["virial"] - before["virial"]) / duration
         return float((2.0 * kinetic + virial) / (3.0 * size.prod()))
     return None
-
-
-def _time(frame: Frame) -> Iterator[Row]:
-    yield Row("time", f"{frame.time:.2f} s")
 
 
 def _particles(frame: Frame) -> Iterator[Row]:

@@ -58,4 +58,12 @@ class Scene(Model):
     @property
     def frames(self) -> int:
         """How many frames the movie has, the first at time zero."""
-        return int(self.duration * self.movie.fps + 1e-9) + 1
+        return self.frame_at(self.duration) + 1
+
+    def frame_at(self, time: float) -> int:
+        """The last frame that is not after ``time`` [s]."""
+        return int(time * self.movie.fps / self.movie.speed + 1e-9)
+
+    def time_of(self, frame: int) -> float:
+        """The time of a frame [s]."""
+        return frame * self.movie.speed / self.movie.fps

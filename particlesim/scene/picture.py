@@ -16,6 +16,7 @@ from particlesim.scene.base import (
     Number,
     PlainFloat,
     Positive,
+    PositiveNumber,
     Vector,
     shorthand,
     whole,
@@ -141,6 +142,7 @@ class Movie(Model):
     """The file that comes out."""
 
     fps: Annotated[PlainFloat, Field(ge=1, le=240), must_be("a number of frames a second from 1 to 240")] = 30.0
+    speed: Annotated[PositiveNumber, must_be("a number of seconds above 0")] = 1.0  # of the scene, in one of the movie
     quality: Quality = "normal"
     resolution: Resolution | None = None  # [width, height] in pixels; by the quality if not given
     background: Colour = "#f4f2ee"
