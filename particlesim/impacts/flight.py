@@ -163,10 +163,10 @@ class Flight:
         where = self._where(log)[:-1]
         neighbours, count = self._neighbours, len(islands.start) - 1
         arguments = neighbours.start, neighbours.other, met, times, self._first_met, islands.start, islands.member
-        with Crew(len(islands.member)) as crew:
-            parts = crew.each(
-                lambda _, first, last: run_islands(*where, *arguments, duration, self._tally, first, last), count
-            )
+        crew = Crew(len(islands.member))
+        parts = crew.each(
+            lambda _, first, last: run_islands(*where, *arguments, duration, self._tally, first, last), count
+        )
         log = extended(self._course, log, [piece for piece, _, _ in parts], [whose for _, whose, _ in parts])
         return log, sum(left for _, _, left in parts)
 
@@ -201,27 +201,27 @@ class Flight:
         """Bring everyone to the end of the stretch."""
         course, neighbours = self._course, self._neighbours
         count = len(self._constants.mass)
-        with Crew(count) as crew:
-            times = crew.each(
-                lambda _, first, last: fly_on(
-                    self._constants, self._state, self._world, course.clock, course.acceleration,
-                    neighbours.anchor, neighbours.leash, duration, first, last,
-                ),
-                count,
-            )  # fmt: skip
+        crew = Crew(count)
+        times = crew.each(
+            lambda _, first, last: fly_on(
+                self._constants, self._state, self._world, course.clock, course.acceleration,
+                neighbours.anchor, neighbours.leash, duration, first, last,
+            ),
+            count,
+        )  # fmt: skip
         self._on_leash = min(times)
 
     def _look_around(self, duration: float) -> None:
         """Find the neighbours of all, with leashes for a stretch of ``duration``."""
         count = len(self._constants.mass)
-        with Crew(count) as crew:
-            crew.each(
-                lambda _, first, last: leashes(
-                    self._constants.radius, self._state.velocity, self._course.acceleration, duration,
-                    self._leash, first, last,
-                ),
-                count,
-            )  # fmt: skip
+        crew = Crew(count)
+        crew.each(
+            lambda _, first, last: leashes(
+                self._constants.radius, self._state.velocity, self._course.acceleration, duration,
+                self._leash, first, last,
+            ),
+            count,
+        )  # fmt: skip
         self._meet_neighbours(self._state.position)
 
     def _meet_neighbours(self, position: np.ndarray) -> None:

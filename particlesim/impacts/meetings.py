@@ -104,8 +104,8 @@ def _across(island, start, other, whom):
 
 def _met(where: Where, pairs: np.ndarray, times: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:
     """Those of the pairs that meet, and when, with the times of -1 filled in."""
-    with Crew(len(pairs)) as crew:
-        crew.each(lambda _, first, last: _look_closer(*where, pairs, times, duration, first, last), len(pairs))
+    crew = Crew(len(pairs))
+    crew.each(lambda _, first, last: _look_closer(*where, pairs, times, duration, first, last), len(pairs))
     meet = times < np.inf
     return pairs[meet], times[meet]
 
@@ -121,8 +121,8 @@ def first_meetings(where: Where, neighbours: Neighbours, duration: float) -> tup
         table.kind, constants.shape, constants.radius, state.position, state.velocity, course.acceleration,
         world.lower, world.upper, world.boundary, world.period, neighbours.start, neighbours.other, duration,
     )  # fmt: skip
-    with Crew(count) as crew:
-        parts = crew.each(lambda _, first, last: sieve(*arguments, first, last), count)
+    crew = Crew(count)
+    parts = crew.each(lambda _, first, last: sieve(*arguments, first, last), count)
     pairs, times = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return _met(where, pairs, times, duration)
 

@@ -79,8 +79,8 @@ def find_neighbours(
     """Neighbours of particles at ``position`` (n, 3) on leashes (n,), and the number of boxes compared."""
     count = len(radius)
     lower, upper = np.empty((count, 3)), np.empty((count, 3))
-    with Crew(count) as crew:
-        crew.each(lambda _, first, last: _box(position, radius, leash, lower, upper, first, last), count)
+    crew = Crew(count)
+    crew.each(lambda _, first, last: _box(position, radius, leash, lower, upper, first, last), count)
     pairs, tested = find_pairs(lower, upper, period)
     near = np.empty(len(pairs), dtype=np.bool_)
     start = np.zeros(count + 2, dtype=np.int64)
