@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from particlesim.constants import MAX_MANIFOLD
+from particlesim.constants import MAX_MANIFOLD, WALL
 from particlesim.crew import Crew
 from particlesim.impacts.course import Course, Log, path_of_piece, path_of_state
-from particlesim.impacts.neighbours import Neighbours
+from particlesim.impacts.neighbours import Neighbours, around_of, far_apart
 from particlesim.impacts.next_impact import body_of, later, pair_meets, wall_meets
-from particlesim.impacts.sieve import sieve
+from particlesim.impacts.sieve import balls, free_way, grown, sieve, sieve_walls
 from particlesim.jit import borrowed, kernel
 from particlesim.narrow_phase.contacts import wall_of_partner
 from particlesim.state import Constants, ShapeTable, State, World
@@ -86,20 +86,41 @@ def _look_closer(table, world, constants, state, course, log, pairs, times, dura
 
 
 @kernel
-def _across(island, start, other, whom):
-    """Pairs (m, 2), the smaller first, of particles ``whom`` with neighbours of other islands."""
+def _across(island, head, first_piece, ball, period, place, start, other, whom):
+    """Pairs (m, 2), the smaller first, of particles ``whom`` with neighbours of other islands that they may meet.
+
+    ``whom`` are all those whose pieces of path begin with ``first_piece`` or later; pairs among them stand there once.
+    """
+    around = around_of(period)
+    pairs = np.empty((256, 2), dtype=np.int64)
     count = 0
     for i in whom:
-        count += start[i + 1] - start[i]
-    pairs = np.empty((count, 2), dtype=np.int64)
-    count = 0
-    for i in whom:
-        for near in range(start[i], start[i + 1]):
+        p = place[i]
+        while count + start[p + 1] - start[p] > len(pairs):
+            pairs = grown(pairs)
+        for near in range(start[p], start[p + 1]):
             j = other[near]
-            if island[j] != island[i]:
-                pairs[count, 0], pairs[count, 1] = min(i, j), max(i, j)
-                count += 1
+            if island[j] == island[i] or (j < i and head[j] >= first_piece) or far_apart(ball, p, place[j], around):
+                continue
+            pairs[count, 0], pairs[count, 1] = min(i, j), max(i, j)
+            count += 1
     return pairs[:count]
+
+
+@kernel
+def _ball_of_paths(log_piece, following, course_head, state, course_acceleration, radius, place, duration, ball, whom):
+    """Let the balls of particles ``whom`` be as large as they went, or go, in the stretch."""
+    for i in whom:
+        piece, way = course_head[i], 0.0
+        if piece < 0:
+            way = free_way(row(state.velocity, i), row(course_acceleration, i), duration)
+        while piece >= 0:
+            after = following[piece]
+            time = (log_piece[after, 0] if after >= 0 else duration) - log_piece[piece, 0]
+            _, _, velocity, _, acceleration = path_of_piece(log_piece, piece)
+            way += free_way(velocity, acceleration, time)
+            piece = after
+        ball[place[i], 3] = radius[i] + way
 
 
 def _met(where: Where, pairs: np.ndarray, times: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:
@@ -110,25 +131,49 @@ def _met(where: Where, pairs: np.ndarray, times: np.ndarray, duration: float) ->
     return pairs[meet], times[meet]
 
 
-def first_meetings(where: Where, neighbours: Neighbours, duration: float) -> tuple[np.ndarray, np.ndarray]:
-    """Who meets whom within ``duration`` [s] if all go on as they are: pairs (m, 2), sorted by the first, times (m,).
+def first_meetings(
+    where: Where, neighbours: Neighbours, ball: np.ndarray, duration: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Who meets whom within ``duration`` [s] if all go on as they are: pairs (m, 2), sorted, and times (m,).
 
-    Partners below 0 are walls.
+    Partners below 0 are walls. ``ball`` (n, 8) is filled in (see sieve.py).
     """
     table, world, constants, state, course, _ = where
-    count = len(constants.radius)
-    arguments = (
-        table.kind, constants.shape, constants.radius, state.position, state.velocity, course.acceleration,
-        world.lower, world.upper, world.boundary, world.period, neighbours.start, neighbours.other, duration,
-    )  # fmt: skip
+    count, at = len(constants.radius), neighbours
+    moving = constants.radius, state.position, state.velocity, course.acceleration
     crew = Crew(count)
-    parts = crew.each(lambda _, first, last: sieve(*arguments, first, last), count)
+    alike = all(crew.each(lambda _, first, last: balls(*moving, at.place, duration, ball, first, last), count))
+    among = course.acceleration, alike, ball, at.particle, at.later_start, at.later, world.period, duration
+    parts = crew.each(lambda _, first, last: sieve(table.kind, constants.shape, *among, first, last), count)
+    if (world.boundary == WALL).any():
+        walls = table.kind, constants.shape, *moving, world.lower, world.upper, world.boundary, duration
+        parts += crew.each(lambda _, first, last: sieve_walls(*walls, first, last), count)
     pairs, times = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    return _met(where, pairs, times, duration)
+    pairs, times = _met(where, pairs, times[:, 0], duration)
+    order = np.argsort(pairs[:, 0] * (count + 6) + pairs[:, 1])
+    return pairs[order], times[order]
 
 
-def missed_meetings(where: Where, neighbours: Neighbours, whom: np.ndarray, duration: float) -> np.ndarray:
-    """Pairs (m, 2) that particles ``whom`` make with others of other islands, whatever either has met meanwhile."""
-    pairs = _across(where[4].island, neighbours.start, neighbours.other, whom)
+def missed_meetings(
+    where: Where, neighbours: Neighbours, ball: np.ndarray, whom: np.ndarray, first_piece: int, duration: float
+) -> np.ndarray:
+    """Pairs (m, 2) that particles ``whom`` make with others of other islands, whatever either has met meanwhile.
+
+    ``whom`` are all those whose pieces of path begin with ``first_piece`` or later.
+    """
+    _, world, _, _, course, _ = where
+    pairs = _across(
+        course.island, course.head, first_piece, ball, world.period,
+        neighbours.place, neighbours.start, neighbours.other, whom,
+    )  # fmt: skip
     met, _ = _met(where, pairs, np.full(len(pairs), -1.0), duration)
     return met
+
+
+def widen(where: Where, neighbours: Neighbours, ball: np.ndarray, whom: np.ndarray, duration: float) -> None:
+    """Let the balls of particles ``whom`` hold the paths they have taken."""
+    _, _, constants, state, course, log = where
+    _ball_of_paths(
+        log.piece, log.following, course.head, state, course.acceleration,
+        constants.radius, neighbours.place, duration, ball, whom,
+    )  # fmt: skip
