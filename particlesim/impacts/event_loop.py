@@ -35,7 +35,7 @@ def _among(whom, size, i):
 
 
 @kernel(inline=True)
-def _foretell(table, world, constants, state, course, place, start, other, whom, done, soonest, duration, heap, points):
+def _foretell(table, world, constants, state, course, lists, whom, done, soonest, duration, heap, points):
     """Put the next impacts of particle ``whom[done]`` with its island and with the walls on the heap.
 
     Those with ``whom[:done]`` are there already; impacts sooner than ``soonest`` [s] from now are none.
@@ -46,8 +46,9 @@ def _foretell(table, world, constants, state, course, place, start, other, whom,
     now = clock[i]
     path = path_of_state(state, course.acceleration, i)
     body = body_of(constants, i)
-    for near in range(start[place[i]], start[place[i] + 1]):
-        j = other[near]
+    place = lists.place[i]
+    for near in range(lists.start[place], lists.start[place + 1]):
+        j = lists.particle[lists.other[near]]
         if island[j] != island[i] or _among(whom, done, j):
             continue
         moments = row(constants.inertia, j)
@@ -180,9 +181,7 @@ def run_islands(
     constants,
     state,
     course,
-    place,
-    start,
-    other,
+    lists,
     met,
     times,
     first_met,
@@ -196,12 +195,12 @@ def run_islands(
     """Carry out the impacts of islands ``first .. last`` within ``duration`` [s].
 
     The members of island ``k`` are ``member[edges[k]:edges[k + 1]]``; ``met`` (m, 2), ``times`` and ``first_met`` are
-    the meetings on the paths of the start, ``place``, ``start`` and ``other`` the neighbours. Adds to the row of
+    the meetings on the paths of the start, ``lists`` those of the neighbours. Adds to the row of
     ``tally`` (n, TALLY) of each island's first member.
     Returns the pieces of path and whose they are, and how many islands were left with impacts to answer.
     """
     table, world, constants, state, course = borrowed((table, world, constants, state, course))
-    place, start, other, met, times, first_met = borrowed((place, start, other, met, times, first_met))
+    lists, met, times, first_met = borrowed((lists, met, times, first_met))
     edges, member, tally = borrowed((edges, member, tally))
     stamp, head = course.stamp, course.head
     points = np.empty((MAX_MANIFOLD, 3))
@@ -266,22 +265,7 @@ def run_islands(
             # What touches and was found not to approach must not be foretold for this moment again.
             soonest = SIMULTANEOUS * duration if outcome == NOTHING else 0.0
             for m in range(size):
-                _foretell(
-                    table,
-                    world,
-                    constants,
-                    state,
-                    course,
-                    place,
-                    start,
-                    other,
-                    whom,
-                    m,
-                    soonest,
-                    duration,
-                    heap,
-                    points,
-                )
+                _foretell(table, world, constants, state, course, lists, whom, m, soonest, duration, heap, points)
         if left == 0:
             unfinished += 1
             while pieces + 2 * len(members) > len(piece):

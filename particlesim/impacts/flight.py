@@ -21,9 +21,9 @@ from particlesim.constants import LONGEST_STRETCH, MAX_HALVINGS, MAX_ROUNDS
 from particlesim.crew import Crew
 from particlesim.impacts.course import Log, empty_log, extended, forget, new_course, rewind
 from particlesim.impacts.event_loop import run_islands
-from particlesim.impacts.free_flight import all_on_leash, fly_on, paces
-from particlesim.impacts.islands import Islands, newly_touched, unite
-from particlesim.impacts.meetings import Where, first_meetings, missed_meetings, widen
+from particlesim.impacts.free_flight import fly_on, paces
+from particlesim.impacts.islands import Islands, add_up, newly_touched, unite
+from particlesim.impacts.meetings import Where, first_meetings, follow_paths, missed_meetings
 from particlesim.impacts.neighbours import FindPairs, find_neighbours, in_order, leashes, pairs_of, places_of
 from particlesim.impacts.response import IMPACTS, TALLY, VIRIAL, WALLS
 from particlesim.impacts.resting import Resting
@@ -35,6 +35,9 @@ _ROWS = 4096
 
 # Neighbours are looked up so often before particles get new places: they go far slower than that.
 _PLACES_LAST = 16
+
+# To carry an island through its impacts takes as long as other work on so many particles.
+_ISLAND = 32
 
 # What the time goes into: finding neighbours, who meets whom, answering impacts, moving on.
 PHASES = ("pairs", "contacts", "respond", "advance")
@@ -88,7 +91,10 @@ class Flight:
         if not count:
             return math.inf
         sums = np.empty((-(-count // _ROWS), 2))
-        fastest = paces(self._constants, self._state, self._world, sums, _ROWS)
+        of_blocks = Crew(count).each(
+            lambda _, first, last: paces(self._constants, self._state, self._world, sums, _ROWS, first, last), len(sums)
+        )
+        fastest = max(of_blocks)
         pace, pull = sums.sum(axis=0) / count
         time = _time_for(fraction, pace, pull)
         time = min(time, self._resting.longest_stretch)
@@ -139,7 +145,7 @@ class Flight:
             with self._spent_on("respond"):
                 islands = unite(course, linked)
                 rewind(course, log, state, islands.member)
-                self._tally[islands.member] = 0.0
+                self._tally[islands.member[islands.start[:-1]]] = 0.0
                 first_piece = len(log.particle)
                 log, left = self._run(islands, log, met, times, duration)
                 unfinished += left
@@ -149,15 +155,15 @@ class Flight:
             rounds += 1
         done = not len(linked) and (anyhow or not unfinished)
         everyone = np.concatenate(touched)
+        tallied = add_up(self._tally, course.island, everyone)
         if done:
-            self._book(everyone, unfinished)
+            self._book(tallied, unfinished)
             with self._spent_on("advance"):
                 self._fly_on(duration)
         else:
             rewind(course, log, state, everyone)
             self._resting.release()
         self._first_met[met[starts, 0]] = -1
-        self._tally[everyone] = 0.0
         forget(course, everyone)
         return done
 
@@ -168,19 +174,10 @@ class Flight:
         """Carry islands through their impacts; the log with the paths, and how many islands were left unfinished."""
         where = self._where(log)[:-1]
         neighbours, count = self._neighbours, len(islands.start) - 1
-        arguments = (
-            neighbours.place,
-            neighbours.start,
-            neighbours.other,
-            met,
-            times,
-            self._first_met,
-            islands.start,
-            islands.member,
-        )
-        crew = Crew(len(islands.member))
-        parts = crew.each(
-            lambda _, first, last: run_islands(*where, *arguments, duration, self._tally, first, last), count
+        meetings = met, times, self._first_met, islands.start, islands.member
+        parts = Crew(_ISLAND * count).each(
+            lambda _, first, last: run_islands(*where, neighbours.lists, *meetings, duration, self._tally, first, last),
+            count,
         )
         log = extended(self._course, log, [piece for piece, _, _ in parts], [whose for _, whose, _ in parts])
         return log, sum(left for _, _, left in parts)
@@ -191,13 +188,8 @@ class Flight:
         They are among the ``members`` of the islands that have just been carried through.
         """
         course, where = self._course, self._where(log)
-        widen(where, self._neighbours, self._ball, members, duration)
         deflected = members[course.head[members] >= 0]
-        on_leash = all_on_leash(
-            log.piece, log.particle, self._state, course.clock, course.acceleration,
-            self._neighbours.anchor, self._neighbours.leash, self._world.period, duration, first_piece, deflected,
-        )  # fmt: skip
-        if not on_leash:
+        if not follow_paths(where, self._neighbours, self._ball, members, duration):
             # Longer leashes for those that went astray: nobody goes farther than at his greatest speed all the time.
             speed = np.linalg.norm(log.piece[:, 8:11], axis=1) + np.linalg.norm(self._world.gravity) * duration
             np.maximum.at(self._leash, log.particle, 1.1 * speed * duration)
@@ -208,9 +200,8 @@ class Flight:
             first_piece = 0
         return missed_meetings(where, self._neighbours, self._ball, deflected, first_piece, duration)
 
-    def _book(self, touched: np.ndarray, unfinished: int) -> None:
-        """Add what the islands tallied, in their order, and what resting contacts bore to the counts."""
-        total = self._tally[touched].sum(axis=0)
+    def _book(self, total: np.ndarray, unfinished: int) -> None:
+        """Add what the islands tallied, and what resting contacts bore to the counts."""
         self.counts.impacts += int(total[IMPACTS])
         self.counts.virial += float(total[VIRIAL]) + self._resting.virial
         self.counts.wall_impulse += total[WALLS:] + self._resting.wall_impulse

@@ -92,3 +92,15 @@ def newly_touched(touched, met):
                 new[count] = i
                 count += 1
     return new[:count]
+
+
+@kernel
+def add_up(tally, island, touched):
+    """The sum over islands, in the order of the particles ``touched``, of the rows of ``tally``, which become 0."""
+    total = np.zeros(tally.shape[1])
+    for i in touched:
+        for column in range(tally.shape[1]):
+            if island[i] == i:
+                total[column] += tally[i, column]
+            tally[i, column] = 0.0
+    return total

@@ -36,17 +36,23 @@ class Places(NamedTuple):
     place: np.ndarray  # (n,) int32, where a particle is
 
 
-class Neighbours(NamedTuple):
-    """Neighbours of each particle, by its place."""
+class Lists(NamedTuple):
+    """The places of all neighbours of place p: other[start[p]:start[p + 1]]."""
 
     particle: np.ndarray  # (n,) int32, who is at a place
     place: np.ndarray  # (n,) int32, where a particle is
+    start: np.ndarray  # (n + 1,) int64
+    other: np.ndarray  # (2 m,) int32
+
+
+class Neighbours(NamedTuple):
+    """Who may meet whom."""
+
     anchor: np.ndarray  # (n, 3) of each particle [m]
     leash: np.ndarray  # (n,) of each particle [m]
+    lists: Lists
     later_start: np.ndarray  # (n + 1,) int64
     later: np.ndarray  # (m,) int32, the places of later neighbours of place p: later[later_start[p]:later_start[p + 1]]
-    start: np.ndarray  # (n + 1,) int64
-    other: np.ndarray  # (2 m,) int32, all neighbours of place p: other[start[p]:start[p + 1]]
 
 
 def places_of(position: np.ndarray, period: np.ndarray) -> Places:
@@ -138,9 +144,9 @@ def _add_up(counts):
 
 
 @kernel
-def _both_ways(particle, later_start, later, start, other):
+def _both_ways(later_start, later, start, other):
     """Write all neighbours of each place, unsorted, and where they begin into ``start``, which is 0 and longer by 2."""
-    count = len(particle)
+    count = len(later_start) - 1
     for p in range(count):
         start[p + 2] += later_start[p + 1] - later_start[p]
         for k in range(later_start[p], later_start[p + 1]):
@@ -150,20 +156,20 @@ def _both_ways(particle, later_start, later, start, other):
     for p in range(count):
         for k in range(later_start[p], later_start[p + 1]):
             q = later[k]
-            other[start[p + 1]] = particle[q]
+            other[start[p + 1]] = q
             start[p + 1] += 1
-            other[start[q + 1]] = particle[p]
+            other[start[q + 1]] = p
             start[q + 1] += 1
 
 
 @kernel
-def _sort_rows(start, other, first, last):
-    """Sort the neighbours of places ``first .. last`` by insertion: they are few."""
+def _sort_rows(particle, start, other, first, last):
+    """Sort the neighbours of places ``first .. last`` by their numbers, by insertion: they are few."""
     for p in range(first, last):
         for k in range(start[p] + 1, start[p + 1]):
             value = other[k]
             hole = k
-            while hole > start[p] and other[hole - 1] > value:
+            while hole > start[p] and particle[other[hole - 1]] > particle[value]:
                 other[hole] = other[hole - 1]
                 hole -= 1
             other[hole] = value
@@ -192,22 +198,22 @@ def find_neighbours(
     _add_up(later_start)
     start = np.zeros(count + 2, dtype=np.int64)
     other = np.empty(2 * len(later), dtype=np.int32)
-    _both_ways(places.particle, later_start, later, start, other)
-    found = Neighbours(*places, position.copy(), leash, later_start, later, start[:-1], other)
-    return found, tested, candidates
+    _both_ways(later_start, later, start, other)
+    lists = Lists(*places, start[:-1], other)
+    return Neighbours(position.copy(), leash, lists, later_start, later), tested, candidates
 
 
 def in_order(neighbours: Neighbours) -> None:
-    """Put the neighbours of each particle in ascending order."""
-    start, other = neighbours.start, neighbours.other
-    count = len(start) - 1
-    Crew(count).each(lambda _, first, last: _sort_rows(start, other, first, last), count)
+    """Put the neighbours of each particle in the order of their numbers."""
+    particle, _, start, other = neighbours.lists
+    count = len(particle)
+    Crew(count).each(lambda _, first, last: _sort_rows(particle, start, other, first, last), count)
 
 
 def pairs_of(neighbours: Neighbours) -> np.ndarray:
     """All pairs of neighbours, (m, 2) int64, i < j."""
-    earlier = np.repeat(neighbours.particle, np.diff(neighbours.later_start))
-    pairs = np.column_stack((earlier, neighbours.particle[neighbours.later])).astype(np.int64)
+    earlier = np.repeat(neighbours.lists.particle, np.diff(neighbours.later_start))
+    pairs = np.column_stack((earlier, neighbours.lists.particle[neighbours.later])).astype(np.int64)
     pairs.sort(axis=1)
     return pairs
 

@@ -172,10 +172,11 @@ def _pressed_walls(world):
 
 
 @kernel
-def find_resting(table, world, constants, state, place, start, other):
+def find_resting(table, world, constants, state, lists):
     """Contact points that may rest, and their partners (m, 2): on walls, and all that hangs together with these."""
     table, world, constants, state = borrowed((table, world, constants, state))
     position, radius = state.position, constants.radius
+    particle, place, start, other = lists
     count = len(radius)
     points, gaps = np.empty((MAX_MANIFOLD, 3)), np.empty(MAX_MANIFOLD)
     partner, point = np.empty((64, 2), dtype=np.int64), np.empty((64, COLUMNS))
@@ -211,7 +212,7 @@ def find_resting(table, world, constants, state, place, start, other):
                     table, world, constants, state, i, wall_as_partner(wall), points, gaps, partner, point, size
                 )
         for near in range(start[here], start[here + 1]):
-            j = other[near]
+            j = particle[other[near]]
             if reached[j] == 2:
                 continue
             more = _add_contact(
@@ -313,9 +314,7 @@ class Resting:
             return
         constants, state = self._constants, self._state
         acceleration[self._held] = self._world.gravity
-        partner, point = find_resting(
-            self._table, self._world, constants, state, neighbours.place, neighbours.start, neighbours.other
-        )
+        partner, point = find_resting(self._table, self._world, constants, state, neighbours.lists)
         self._held = np.unique(partner[partner >= 0])
         self._before = state.velocity[self._held], state.angular_momentum[self._held]
         self.wall_impulse, self.virial = np.zeros(6), 0.0
