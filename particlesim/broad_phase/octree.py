@@ -194,25 +194,11 @@ def _images(period: np.ndarray, seen: Survey, scale: float) -> tuple[np.ndarray,
     return shifts, margin.astype(np.float32)
 
 
-def octree_pairs(
-    lower: np.ndarray, upper: np.ndarray, period: np.ndarray, max_count: int = 32, max_depth: int = 16
-) -> tuple[np.ndarray, int]:
-    """Pairs (m, 2) int64 and the number of box tests.  Arguments as checked by ``find_pairs``.
-
-    A node is split while it holds more than ``max_count`` boxes, down to ``max_depth`` levels of octants of the cube
-    about most of the particles; octants that hold no more together stay together.  Boxes of very different sizes are
-    in trees of their own (``codes.size_class``), which are the first children of the root.
-
-    Raises ``ValueError`` for ``max_count`` below 1 or ``max_depth`` outside 1 .. 20.
-    """
-    if max_count < 1:
-        raise ValueError(f"octree: max_count must be at least 1, got {max_count}")
-    if not 1 <= max_depth <= LEVELS:
-        raise ValueError(f"octree: max_depth must be in 1 .. {LEVELS}, got {max_depth}")
+def _candidates(
+    lower: np.ndarray, upper: np.ndarray, period: np.ndarray, max_count: int, max_depth: int, crew: Crew
+) -> tuple[list[np.ndarray], int, bool]:
+    """Lists of pairs of boxes that overlap, the number of box tests, and whether a pair may be there more than once."""
     count = len(lower)
-    if count == 0:
-        return np.empty((0, 2), dtype=np.int64), 0
-    crew = Crew(count)
     seen = survey(lower, upper, period, crew)
     edge = float((seen.region_upper - seen.region_lower).max())
     scale = 1.0 / edge if edge > 1e-300 else 0.0  # to the unit cube
@@ -233,4 +219,28 @@ def octree_pairs(
         return _search(first, last, leaves, nodes, bounds, columns, boxes, order, shifts, margin, period, keys)
 
     lists, tested = collect(search, len(leaves), crew, 2 * count)
-    return canonical(lists, count, crew, unique=len(shifts) > 1), tested
+    return lists, tested, len(shifts) > 1
+
+
+def octree_pairs(
+    lower: np.ndarray, upper: np.ndarray, period: np.ndarray, max_count: int = 32, max_depth: int = 16
+) -> tuple[np.ndarray, int]:
+    """Pairs (m, 2) int64 and the number of box tests.  Arguments as checked by ``find_pairs``.
+
+    A node is split while it holds more than ``max_count`` boxes, down to ``max_depth`` levels of octants of the cube
+    about most of the particles; octants that hold no more together stay together.  Boxes of very different sizes are
+    in trees of their own (``codes.size_class``), which are the first children of the root.
+
+    Raises ``ValueError`` for ``max_count`` below 1 or ``max_depth`` outside 1 .. 20.
+    """
+    if max_count < 1:
+        raise ValueError(f"octree: max_count must be at least 1, got {max_count}")
+    if not 1 <= max_depth <= LEVELS:
+        raise ValueError(f"octree: max_depth must be in 1 .. {LEVELS}, got {max_depth}")
+    count = len(lower)
+    if count == 0:
+        return np.empty((0, 2), dtype=np.int64), 0
+    crew = Crew(count)
+    # What the search needs is given back before the pairs are sorted: that takes the most memory of all.
+    lists, tested, unique = _candidates(lower, upper, period, max_count, max_depth, crew)
+    return canonical(lists, count, crew, unique=unique), tested

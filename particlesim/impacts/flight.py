@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from particlesim.constants import LONGEST_STRETCH, MAX_HALVINGS, MAX_ROUNDS
+from particlesim.constants import LONGEST_STRETCH, MAX_HALVINGS, MAX_ROUNDS, WALL
 from particlesim.crew import Crew
 from particlesim.impacts.course import Log, empty_log, extended, forget, new_course, rewind
 from particlesim.impacts.event_loop import run_islands
@@ -67,7 +67,7 @@ class Flight:
         self._course = new_course(count, world.gravity)
         self._leash = np.empty(count)
         self._first_met = np.full(count, -1, dtype=np.int64)
-        self._tally = np.zeros((count, TALLY))
+        self._tally = np.zeros((count, TALLY if (world.boundary == WALL).any() else WALLS))
         self._resting = Resting(table, world, constants, state)
         self.counts = Counts()
         self.seconds = dict.fromkeys(PHASES, 0.0)
@@ -204,7 +204,8 @@ class Flight:
         """Add what the islands tallied, and what resting contacts bore to the counts."""
         self.counts.impacts += int(total[IMPACTS])
         self.counts.virial += float(total[VIRIAL]) + self._resting.virial
-        self.counts.wall_impulse += total[WALLS:] + self._resting.wall_impulse
+        self.counts.wall_impulse[: len(total) - WALLS] += total[WALLS:]
+        self.counts.wall_impulse += self._resting.wall_impulse
         self.counts.unresolved += unfinished > 0
 
     def _fly_on(self, duration: float) -> None:

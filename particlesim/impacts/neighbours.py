@@ -71,17 +71,13 @@ def places_of(position: np.ndarray, period: np.ndarray) -> Places:
 
 
 @kernel
-def _box(position, radius, leash, particle, sphere, lower, upper, first, last):
-    """Boxes and spheres (n, 4) of what particles at places ``first .. last`` can reach on their leashes."""
+def _boxes(position, reach, particle, lower, upper, first, last):
+    """Boxes of what particles at places ``first .. last`` can reach on their leashes."""
     for p in range(first, last):
         i = particle[p]
-        reach = radius[i] + leash[i]
         for axis in range(3):
-            x = position[i, axis]
-            sphere[p, axis] = x
-            lower[p, axis] = x - reach
-            upper[p, axis] = x + reach
-        sphere[p, 3] = reach
+            lower[p, axis] = position[i, axis] - reach[i]
+            upper[p, axis] = position[i, axis] + reach[i]
 
 
 @kernel
@@ -137,13 +133,6 @@ def _later(pairs, sphere, period, later_start, first, last):
 
 
 @kernel
-def _add_up(counts):
-    """Let each number be the sum of all up to it."""
-    for k in range(1, len(counts)):
-        counts[k] += counts[k - 1]
-
-
-@kernel
 def _both_ways(later_start, later, start, other):
     """Write all neighbours of each place, unsorted, and where they begin into ``start``, which is 0 and longer by 2."""
     count = len(later_start) - 1
@@ -175,6 +164,28 @@ def _sort_rows(particle, start, other, first, last):
             other[hole] = value
 
 
+def _candidate_pairs(
+    position: np.ndarray, reach: np.ndarray, period: np.ndarray, places: Places, find_pairs: FindPairs
+) -> tuple[np.ndarray, int]:
+    """Pairs of places whose boxes, of half widths ``reach`` (n,), overlap, and the number of boxes compared."""
+    count = len(reach)
+    lower, upper = np.empty((count, 3)), np.empty((count, 3))
+    Crew(count).each(lambda _, first, last: _boxes(position, reach, places.particle, lower, upper, first, last), count)
+    return find_pairs(lower, upper, period)
+
+
+def _later_neighbours(
+    position: np.ndarray, reach: np.ndarray, period: np.ndarray, places: Places, pairs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of the candidate pairs those whose spheres of radius ``reach`` overlap, as ``later_start`` and ``later``."""
+    sphere = np.column_stack((position, reach))[places.particle]
+    later_start = np.zeros(len(reach) + 1, dtype=np.int64)
+    parts = Crew(len(pairs)).each(
+        lambda _, first, last: _later(pairs, sphere, period, later_start, first, last), len(pairs)
+    )
+    return later_start.cumsum(), np.concatenate(parts)
+
+
 def find_neighbours(
     position: np.ndarray,
     radius: np.ndarray,
@@ -184,19 +195,12 @@ def find_neighbours(
     find_pairs: FindPairs,
 ) -> tuple[Neighbours, int, int]:
     """Neighbours of particles at ``position`` (n, 3) on leashes (n,); boxes compared, and candidate pairs found."""
-    count = len(radius)
-    lower, upper, sphere = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 4))
-    crew = Crew(count)
-    crew.each(
-        lambda _, first, last: _box(position, radius, leash, places.particle, sphere, lower, upper, first, last), count
-    )
-    pairs, tested = find_pairs(lower, upper, period)
-    later_start = np.zeros(count + 1, dtype=np.int64)
-    parts = crew.each(lambda _, first, last: _later(pairs, sphere, period, later_start, first, last), len(pairs))
+    reach = radius + leash
+    pairs, tested = _candidate_pairs(position, reach, period, places, find_pairs)
     candidates = len(pairs)
-    later = np.concatenate(parts)
-    _add_up(later_start)
-    start = np.zeros(count + 2, dtype=np.int64)
+    later_start, later = _later_neighbours(position, reach, period, places, pairs)
+    del pairs
+    start = np.zeros(len(radius) + 2, dtype=np.int64)
     other = np.empty(2 * len(later), dtype=np.int32)
     _both_ways(later_start, later, start, other)
     lists = Lists(*places, start[:-1], other)
