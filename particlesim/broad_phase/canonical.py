@@ -131,7 +131,7 @@ def _banded(lists: list[np.ndarray], bands: int, band: int, crew: Crew) -> tuple
 
 
 def canonical(lists: list[np.ndarray], count: int, crew: Crew, *, unique: bool = False) -> np.ndarray:
-    """All keys of ``lists`` as (m, 2) int64 pairs sorted by (i, j), among ``count`` boxes.
+    """All keys of ``lists`` as (m, 2) int64 pairs sorted by (i, j), among ``count`` boxes; uses up the lists.
 
     ``unique``: the lists may hold a pair more than once; it comes out once.
     """
@@ -143,6 +143,7 @@ def canonical(lists: list[np.ndarray], count: int, crew: Crew, *, unique: bool =
         return pairs[: int(_write_band(lists[0], 0, count, unique, pairs))]
     bands = ((count - 1) >> band) + 1
     keys, starts = _banded(lists, bands, band, crew)
+    lists.clear()  # as much memory as the keys take
     pairs = np.empty((len(keys), 2), dtype=np.int64)
     sizes = np.empty(bands, dtype=np.int64)
 

@@ -310,19 +310,19 @@ def grid_pairs(
     numbers = np.arange(count, dtype=np.int32)
     lists: list[np.ndarray] = []
     tested = 0
-    with Crew(count) as crew:
-        left, wanted = numbers, cells or 0
-        while len(left):
-            all_left = len(left) == count
-            found, tests, left = _search(
-                lower if all_left else lower[left],
-                upper if all_left else upper[left],
-                left,
-                period,
-                wanted,
-                crew,
-            )
-            lists += found
-            tested += tests
-            wanted = 0
-        return canonical(lists, count, crew), tested
+    crew = Crew(count)
+    left, wanted = numbers, cells or 0
+    while len(left):
+        all_left = len(left) == count
+        found, tests, left = _search(
+            lower if all_left else lower[left],
+            upper if all_left else upper[left],
+            left,
+            period,
+            wanted,
+            crew,
+        )
+        lists += found
+        tested += tests
+        wanted = 0
+    return canonical(lists, count, crew), tested

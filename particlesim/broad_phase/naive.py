@@ -52,8 +52,8 @@ def naive_pairs(lower: np.ndarray, upper: np.ndarray, period: np.ndarray) -> tup
         columns[:, :count] = boxes.T
     for axis in np.flatnonzero(period > 0.0):
         columns[axis], columns[axis + 3] = -np.inf, np.inf  # the box test alone knows of images
-    with Crew(count) as crew:
-        lists, tested = collect(
-            lambda first, last, keys: _search(first, last, columns, boxes, order, period, keys), count, crew, 4 * count
-        )
-        return canonical(lists, count, crew), tested
+    crew = Crew(count)
+    lists, tested = collect(
+        lambda first, last, keys: _search(first, last, columns, boxes, order, period, keys), count, crew, 4 * count
+    )
+    return canonical(lists, count, crew), tested

@@ -194,6 +194,34 @@ def _images(period: np.ndarray, seen: Survey, scale: float) -> tuple[np.ndarray,
     return shifts, margin.astype(np.float32)
 
 
+def _candidates(
+    lower: np.ndarray, upper: np.ndarray, period: np.ndarray, max_count: int, max_depth: int, crew: Crew
+) -> tuple[list[np.ndarray], int, bool]:
+    """Lists of pairs of boxes that overlap, the number of box tests, and whether a pair may be there more than once."""
+    count = len(lower)
+    seen = survey(lower, upper, period, crew)
+    edge = float((seen.region_upper - seen.region_lower).max())
+    scale = 1.0 / edge if edge > 1e-300 else 0.0  # to the unit cube
+    codes, order = sort_by_code(
+        codes_of(lower, upper, period, seen, scale, crew),
+        np.arange(count, dtype=np.int32),
+        max_count,
+        max_depth,
+        crew,
+    )
+    boxes, columns = in_order(lower, upper, order, period, seen, scale, crew)
+    nodes = build(codes, max_count, max_depth)
+    bounds = fit(nodes, columns, crew)
+    leaves = np.flatnonzero(nodes[:, CHILDREN] == 0).astype(np.int32)
+    shifts, margin = _images(period, seen, scale)
+
+    def search(first: int, last: int, keys: np.ndarray) -> tuple[int, int]:
+        return _search(first, last, leaves, nodes, bounds, columns, boxes, order, shifts, margin, period, keys)
+
+    lists, tested = collect(search, len(leaves), crew, 2 * count)
+    return lists, tested, len(shifts) > 1
+
+
 def octree_pairs(
     lower: np.ndarray, upper: np.ndarray, period: np.ndarray, max_count: int = 32, max_depth: int = 16
 ) -> tuple[np.ndarray, int]:
@@ -212,25 +240,7 @@ def octree_pairs(
     count = len(lower)
     if count == 0:
         return np.empty((0, 2), dtype=np.int64), 0
-    with Crew(count) as crew:
-        seen = survey(lower, upper, period, crew)
-        edge = float((seen.region_upper - seen.region_lower).max())
-        scale = 1.0 / edge if edge > 1e-300 else 0.0  # to the unit cube
-        codes, order = sort_by_code(
-            codes_of(lower, upper, period, seen, scale, crew),
-            np.arange(count, dtype=np.int32),
-            max_count,
-            max_depth,
-            crew,
-        )
-        boxes, columns = in_order(lower, upper, order, period, seen, scale, crew)
-        nodes = build(codes, max_count, max_depth)
-        bounds = fit(nodes, columns, crew)
-        leaves = np.flatnonzero(nodes[:, CHILDREN] == 0).astype(np.int32)
-        shifts, margin = _images(period, seen, scale)
-
-        def search(first: int, last: int, keys: np.ndarray) -> tuple[int, int]:
-            return _search(first, last, leaves, nodes, bounds, columns, boxes, order, shifts, margin, period, keys)
-
-        lists, tested = collect(search, len(leaves), crew, 2 * count)
-        return canonical(lists, count, crew, unique=len(shifts) > 1), tested
+    crew = Crew(count)
+    # What the search needs is given back before the pairs are sorted: that takes the most memory of all.
+    lists, tested, unique = _candidates(lower, upper, period, max_count, max_depth, crew)
+    return canonical(lists, count, crew, unique=unique), tested

@@ -22,6 +22,9 @@ BATCH = 2048
 # Blocks a search is cut into for each thread: the work in a block is uneven.
 BLOCKS_PER_THREAD = 16
 
+# Room for this much more than a block was short of is given to the blocks that come after it.
+_MORE = 1.1
+
 # Rounding of coordinates and of their differences, relative to the largest coordinate: 32 units in the last place.
 # Wherever a method sorts boxes by rounded numbers, it widens its reach by this.
 SLACK = 2.0**-47
@@ -96,13 +99,17 @@ def collect(
 ) -> tuple[list[np.ndarray], int]:
     """Run ``search(first, last, keys) -> (found, tested)`` over ``0 .. count``; the lists of keys and tests made.
 
-    ``expected`` pairs in all are given room at first; a block that finds more is searched again with room for all.
+    ``expected`` pairs in all are given room at first; a block that finds more is searched again with room for all,
+    and those after it are given as much.
     """
+    each = expected / max(count, 1)
 
     def block(_: int, first: int, last: int) -> tuple[np.ndarray, int]:
-        keys = np.empty(expected * (last - first) // max(count, 1) + 2 * BATCH, dtype=np.int64)
+        nonlocal each
+        keys = np.empty(int(each * (last - first)) + 2 * BATCH, dtype=np.int64)
         found, tested = search(first, last, keys)
         if found + BATCH > keys.size:
+            each = max(each, _MORE * found / (last - first))
             keys = np.empty(found + BATCH, dtype=np.int64)
             found, tested = search(first, last, keys)
         return keys[:found], tested

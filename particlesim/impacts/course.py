@@ -30,6 +30,9 @@ class Course(NamedTuple):
     head: np.ndarray  # (n,) int64, its first piece in the log, or NOTHING_MET
     tail: np.ndarray  # (n,) int64, its last piece
     island: np.ndarray  # (n,) int64, the smallest particle whose impacts hang together with its own
+    ring: np.ndarray  # (n,) int64, the next particle of its island, round and round
+    listed: np.ndarray  # (n,) bool, False but while particles are listed
+    touched: np.ndarray  # (n,) bool, whether it has met anything, in any round
     acceleration: np.ndarray  # (n, 3) [m/s^2]
 
 
@@ -49,6 +52,9 @@ def new_course(count: int, gravity: np.ndarray) -> Course:
         head=np.full(count, NOTHING_MET, dtype=np.int64),
         tail=np.full(count, NOTHING_MET, dtype=np.int64),
         island=np.arange(count, dtype=np.int64),
+        ring=np.arange(count, dtype=np.int64),
+        listed=np.zeros(count, dtype=np.bool_),
+        touched=np.zeros(count, dtype=np.bool_),
         acceleration=np.tile(gravity, (count, 1)),
     )
 
@@ -143,4 +149,5 @@ def forget(course, particles):
         course.clock[i] = 0.0
         course.stamp[i] = 0
         course.head[i] = NOTHING_MET
-        course.island[i] = i
+        course.island[i] = course.ring[i] = i
+        course.touched[i] = False

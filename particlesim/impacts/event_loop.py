@@ -12,6 +12,7 @@ from particlesim.impacts.course import NOTHING_MET, PIECE, UNCHAINED, path_of_st
 from particlesim.impacts.next_impact import body_of, later, pair_meets, wall_meets
 from particlesim.impacts.response import LANDED, NOTHING, STRUCK, answer, is_held
 from particlesim.impacts.sieve import grown
+from particlesim.impacts.two_spheres import answer_two, meet_alone
 from particlesim.jit import borrowed, kernel
 from particlesim.narrow_phase.contacts import wall_as_partner
 from particlesim.vec import dot, put, put4, row, vector
@@ -34,7 +35,7 @@ def _among(whom, size, i):
 
 
 @kernel(inline=True)
-def _foretell(table, world, constants, state, course, start, other, whom, done, soonest, duration, heap, points):
+def _foretell(table, world, constants, state, course, lists, whom, done, soonest, duration, heap, points):
     """Put the next impacts of particle ``whom[done]`` with its island and with the walls on the heap.
 
     Those with ``whom[:done]`` are there already; impacts sooner than ``soonest`` [s] from now are none.
@@ -45,8 +46,9 @@ def _foretell(table, world, constants, state, course, start, other, whom, done, 
     now = clock[i]
     path = path_of_state(state, course.acceleration, i)
     body = body_of(constants, i)
-    for near in range(start[i], start[i + 1]):
-        j = other[near]
+    place = lists.place[i]
+    for near in range(lists.start[place], lists.start[place + 1]):
+        j = lists.particle[lists.other[near]]
         if island[j] != island[i] or _among(whom, done, j):
             continue
         moments = row(constants.inertia, j)
@@ -179,8 +181,7 @@ def run_islands(
     constants,
     state,
     course,
-    start,
-    other,
+    lists,
     met,
     times,
     first_met,
@@ -194,12 +195,12 @@ def run_islands(
     """Carry out the impacts of islands ``first .. last`` within ``duration`` [s].
 
     The members of island ``k`` are ``member[edges[k]:edges[k + 1]]``; ``met`` (m, 2), ``times`` and ``first_met`` are
-    the meetings on the paths of the start, ``start`` and ``other`` the neighbours. Adds to the row of ``tally``
-    (n, TALLY) of each island's first member.
+    the meetings on the paths of the start, ``lists`` those of the neighbours. Adds to the row of
+    ``tally`` (n, TALLY) of each island's first member.
     Returns the pieces of path and whose they are, and how many islands were left with impacts to answer.
     """
     table, world, constants, state, course = borrowed((table, world, constants, state, course))
-    start, other, met, times, first_met = borrowed((start, other, met, times, first_met))
+    lists, met, times, first_met = borrowed((lists, met, times, first_met))
     edges, member, tally = borrowed((edges, member, tally))
     stamp, head = course.stamp, course.head
     points = np.empty((MAX_MANIFOLD, 3))
@@ -210,6 +211,15 @@ def run_islands(
     for k in range(first, last):
         heap.clear()
         members = member[edges[k] : edges[k + 1]]
+        i, j = min(members[0], members[-1]), max(members[0], members[-1])
+        if len(members) == 2 and meet_alone(table.kind, world, constants.shape, met, first_met, i, j):
+            while pieces + 4 > len(piece):
+                piece, particle = grown(piece), grown(particle)
+            if answer_two(
+                world, constants, state, course, i, j, times[first_met[i]], duration, tally[i], piece, particle, pieces
+            ):
+                pieces += 4
+                continue
         _begin(met, times, first_met, stamp, members, heap)
         time = 0.0
         left, slow_left = MAX_IMPACTS * len(members), MAX_SLOW_IMPACTS * len(members)
@@ -255,9 +265,7 @@ def run_islands(
             # What touches and was found not to approach must not be foretold for this moment again.
             soonest = SIMULTANEOUS * duration if outcome == NOTHING else 0.0
             for m in range(size):
-                _foretell(
-                    table, world, constants, state, course, start, other, whom, m, soonest, duration, heap, points
-                )
+                _foretell(table, world, constants, state, course, lists, whom, m, soonest, duration, heap, points)
         if left == 0:
             unfinished += 1
             while pieces + 2 * len(members) > len(piece):

@@ -17,14 +17,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from particlesim.constants import LONGEST_STRETCH, MAX_HALVINGS, MAX_ROUNDS
+from particlesim.constants import LONGEST_STRETCH, MAX_HALVINGS, MAX_ROUNDS, WALL
 from particlesim.crew import Crew
 from particlesim.impacts.course import Log, empty_log, extended, forget, new_course, rewind
 from particlesim.impacts.event_loop import run_islands
-from particlesim.impacts.free_flight import all_on_leash, fly_on, paces
-from particlesim.impacts.islands import Islands, unite
-from particlesim.impacts.meetings import Where, first_meetings, missed_meetings
-from particlesim.impacts.neighbours import FindPairs, find_neighbours, leashes
+from particlesim.impacts.free_flight import fly_on, paces
+from particlesim.impacts.islands import Islands, add_up, newly_touched, unite
+from particlesim.impacts.meetings import Where, first_meetings, follow_paths, missed_meetings
+from particlesim.impacts.neighbours import FindPairs, find_neighbours, in_order, leashes, pairs_of, places_of
 from particlesim.impacts.response import IMPACTS, TALLY, VIRIAL, WALLS
 from particlesim.impacts.resting import Resting
 from particlesim.state import Constants, ShapeTable, State, World
@@ -32,6 +32,12 @@ from particlesim.state import Constants, ShapeTable, State, World
 # Particles whose paces are summed at a time: sums depend on the order, and must not on the number of threads.
 _ROWS = 4096
 
+
+# Neighbours are looked up so often before particles get new places: they go far slower than that.
+_PLACES_LAST = 16
+
+# To carry an island through its impacts takes as long as other work on so many particles.
+_ISLAND = 32
 
 # What the time goes into: finding neighbours, who meets whom, answering impacts, moving on.
 PHASES = ("pairs", "contacts", "respond", "advance")
@@ -61,17 +67,19 @@ class Flight:
         self._course = new_course(count, world.gravity)
         self._leash = np.empty(count)
         self._first_met = np.full(count, -1, dtype=np.int64)
-        self._tally = np.zeros((count, TALLY))
+        self._tally = np.zeros((count, TALLY if (world.boundary == WALL).any() else WALLS))
         self._resting = Resting(table, world, constants, state)
         self.counts = Counts()
         self.seconds = dict.fromkeys(PHASES, 0.0)
+        self._ball = np.empty((count, 8))  # by place, what each particle cannot leave in the present stretch
+        self._looked = 0  # how often neighbours were looked up
         self._on_leash = -1.0
         self._look_around(0.0)
 
     @property
     def pairs(self) -> np.ndarray:
-        """Candidate pairs (m, 2), i < j: nothing else can touch at present."""
-        return self._neighbours.pairs
+        """Pairs of neighbours (m, 2), i < j: nothing else can touch at present."""
+        return pairs_of(self._neighbours)
 
     def longest_stretch(self, fraction: float) -> float:
         """In how long [s] the surfaces move by ``fraction`` of the bounding radius on average; inf if never.
@@ -83,7 +91,10 @@ class Flight:
         if not count:
             return math.inf
         sums = np.empty((-(-count // _ROWS), 2))
-        fastest = paces(self._constants, self._state, self._world, sums, _ROWS)
+        of_blocks = Crew(count).each(
+            lambda _, first, last: paces(self._constants, self._state, self._world, sums, _ROWS, first, last), len(sums)
+        )
+        fastest = max(of_blocks)
         pace, pull = sums.sum(axis=0) / count
         time = _time_for(fraction, pace, pull)
         time = min(time, self._resting.longest_stretch)
@@ -124,35 +135,36 @@ class Flight:
         with self._spent_on("respond"):
             self._resting.hold(self._neighbours, course.acceleration, duration)
         with self._spent_on("contacts"):
-            met, times = first_meetings(self._where(log), self._neighbours, duration)
-        touched = np.unique(met[met >= 0])
-        starts = np.flatnonzero(np.diff(met[:, 0], prepend=-1))
-        self._first_met[met[starts, 0]] = starts
+            met, times = first_meetings(self._where(log), self._neighbours, self._ball, duration)
+            starts = np.flatnonzero(np.diff(met[:, 0], prepend=-1))
+            self._first_met[met[starts, 0]] = starts
+        touched = [newly_touched(course.touched, met)]
         linked = met
         rounds = unfinished = 0
         while len(linked) and (anyhow or (rounds < MAX_ROUNDS and not unfinished)):
             with self._spent_on("respond"):
-                islands = unite(course.island, linked, touched)
+                islands = unite(course, linked)
                 rewind(course, log, state, islands.member)
-                self._tally[islands.member] = 0.0
+                self._tally[islands.member[islands.start[:-1]]] = 0.0
                 first_piece = len(log.particle)
                 log, left = self._run(islands, log, met, times, duration)
                 unfinished += left
             with self._spent_on("contacts"):
-                linked = self._missed(log, first_piece, duration)
-            touched = np.union1d(touched, linked.ravel())
+                linked = self._missed(log, islands.member, first_piece, duration)
+                touched.append(newly_touched(course.touched, linked))
             rounds += 1
         done = not len(linked) and (anyhow or not unfinished)
+        everyone = np.concatenate(touched)
+        tallied = add_up(self._tally, course.island, everyone)
         if done:
-            self._book(touched, unfinished)
+            self._book(tallied, unfinished)
             with self._spent_on("advance"):
                 self._fly_on(duration)
         else:
-            rewind(course, log, state, touched)
+            rewind(course, log, state, everyone)
             self._resting.release()
         self._first_met[met[starts, 0]] = -1
-        self._tally[touched] = 0.0
-        forget(course, touched)
+        forget(course, everyone)
         return done
 
     def _where(self, log: Log) -> Where:
@@ -162,74 +174,79 @@ class Flight:
         """Carry islands through their impacts; the log with the paths, and how many islands were left unfinished."""
         where = self._where(log)[:-1]
         neighbours, count = self._neighbours, len(islands.start) - 1
-        arguments = neighbours.start, neighbours.other, met, times, self._first_met, islands.start, islands.member
-        with Crew(len(islands.member)) as crew:
-            parts = crew.each(
-                lambda _, first, last: run_islands(*where, *arguments, duration, self._tally, first, last), count
-            )
+        meetings = met, times, self._first_met, islands.start, islands.member
+        parts = Crew(_ISLAND * count).each(
+            lambda _, first, last: run_islands(*where, neighbours.lists, *meetings, duration, self._tally, first, last),
+            count,
+        )
         log = extended(self._course, log, [piece for piece, _, _ in parts], [whose for _, whose, _ in parts])
         return log, sum(left for _, _, left in parts)
 
-    def _missed(self, log: Log, first_piece: int, duration: float) -> np.ndarray:
-        """Pairs (m, 2) of different islands that meet after all, of those whose pieces of path start there."""
-        course = self._course
-        deflected = np.unique(log.particle[first_piece:])
-        on_leash = all_on_leash(
-            log.piece, log.particle, self._state, course.clock, course.acceleration,
-            self._neighbours.anchor, self._neighbours.leash, self._world.period, duration, first_piece, deflected,
-        )  # fmt: skip
-        if on_leash:
-            return missed_meetings(self._where(log), self._neighbours, deflected, duration)
-        # Longer leashes for those that went astray: nobody goes farther than at his greatest speed all the time.
-        speed = np.linalg.norm(log.piece[:, 8:11], axis=1) + np.linalg.norm(self._world.gravity) * duration
-        np.maximum.at(self._leash, log.particle, 1.1 * speed * duration)
-        position = self._state.position.copy()
-        moved = np.flatnonzero(course.head >= 0)
-        position[moved] = log.piece[course.head[moved], 1:4]
-        self._meet_neighbours(position)
-        return missed_meetings(self._where(log), self._neighbours, moved, duration)
+    def _missed(self, log: Log, members: np.ndarray, first_piece: int, duration: float) -> np.ndarray:
+        """Pairs (m, 2) of different islands that meet after all, of those whose pieces of path start there.
 
-    def _book(self, touched: np.ndarray, unfinished: int) -> None:
-        """Add what the islands tallied, in their order, and what resting contacts bore to the counts."""
-        total = self._tally[touched].sum(axis=0)
+        They are among the ``members`` of the islands that have just been carried through.
+        """
+        course, where = self._course, self._where(log)
+        deflected = members[course.head[members] >= 0]
+        if not follow_paths(where, self._neighbours, self._ball, members, duration):
+            # Longer leashes for those that went astray: nobody goes farther than at his greatest speed all the time.
+            speed = np.linalg.norm(log.piece[:, 8:11], axis=1) + np.linalg.norm(self._world.gravity) * duration
+            np.maximum.at(self._leash, log.particle, 1.1 * speed * duration)
+            position = self._state.position.copy()
+            deflected = np.flatnonzero(course.head >= 0)
+            position[deflected] = log.piece[course.head[deflected], 1:4]
+            self._meet_neighbours(position)
+            first_piece = 0
+        return missed_meetings(where, self._neighbours, self._ball, deflected, first_piece, duration)
+
+    def _book(self, total: np.ndarray, unfinished: int) -> None:
+        """Add what the islands tallied, and what resting contacts bore to the counts."""
         self.counts.impacts += int(total[IMPACTS])
         self.counts.virial += float(total[VIRIAL]) + self._resting.virial
-        self.counts.wall_impulse += total[WALLS:] + self._resting.wall_impulse
+        self.counts.wall_impulse[: len(total) - WALLS] += total[WALLS:]
+        self.counts.wall_impulse += self._resting.wall_impulse
         self.counts.unresolved += unfinished > 0
 
     def _fly_on(self, duration: float) -> None:
         """Bring everyone to the end of the stretch."""
         course, neighbours = self._course, self._neighbours
         count = len(self._constants.mass)
-        with Crew(count) as crew:
-            times = crew.each(
-                lambda _, first, last: fly_on(
-                    self._constants, self._state, self._world, course.clock, course.acceleration,
-                    neighbours.anchor, neighbours.leash, duration, first, last,
-                ),
-                count,
-            )  # fmt: skip
+        crew = Crew(count)
+        times = crew.each(
+            lambda _, first, last: fly_on(
+                self._constants, self._state, self._world, course.clock, course.acceleration,
+                neighbours.anchor, neighbours.leash, duration, first, last,
+            ),
+            count,
+        )  # fmt: skip
         self._on_leash = min(times)
 
     def _look_around(self, duration: float) -> None:
         """Find the neighbours of all, with leashes for a stretch of ``duration``."""
         count = len(self._constants.mass)
-        with Crew(count) as crew:
-            crew.each(
-                lambda _, first, last: leashes(
-                    self._constants.radius, self._state.velocity, self._course.acceleration, duration,
-                    self._leash, first, last,
-                ),
-                count,
-            )  # fmt: skip
+        crew = Crew(count)
+        crew.each(
+            lambda _, first, last: leashes(
+                self._constants.radius, self._state.velocity, self._course.acceleration, duration,
+                self._leash, first, last,
+            ),
+            count,
+        )  # fmt: skip
+        if self._looked % _PLACES_LAST == 0:
+            self._places = places_of(self._state.position, self._world.period)
+        self._looked += 1
         self._meet_neighbours(self._state.position)
 
     def _meet_neighbours(self, position: np.ndarray) -> None:
-        self._neighbours, tested = find_neighbours(
-            position, self._constants.radius, self._leash, self._world.period, self._find_pairs
+        self._neighbours, tested, candidates = find_neighbours(
+            position, self._constants.radius, self._leash, self._world.period, self._places, self._find_pairs
         )
+        if self._world.gravity.any():
+            # Resting contacts are gone through in this order.
+            in_order(self._neighbours)
         self.counts.pairs_tested += int(tested)
-        self.counts.candidate_pairs += len(self._neighbours.pairs)
+        self.counts.candidate_pairs += candidates
 
 
 def _time_for(way: float, speed: float, acceleration: float) -> float:

@@ -13,7 +13,8 @@ from particlesim.vec import dot, norm, put, put4, row, row4, sub, vector
 @kernel
 def _turns_round(position, lower, period):
     """How often a coordinate has gone round a periodic axis; 0 on any other."""
-    return math.floor((position - lower) / period) if period > 0.0 else 0
+    inside = 0.0 <= position - lower < period  # of most, who are spared the division
+    return math.floor((position - lower) / period) if period > 0.0 and not inside else 0
 
 
 @kernel
@@ -41,13 +42,15 @@ def fly_on(constants, state, world, clock, acceleration, anchor, leash, duration
             pull,
             duration - clock[i],
         )
-        for axis in range(3):
-            image[i, axis] += _turns_round(x[axis], corner[axis], period[axis])
-        x = (
-            x[0] - period[0] * _turns_round(x[0], corner[0], period[0]),
-            x[1] - period[1] * _turns_round(x[1], corner[1], period[1]),
-            x[2] - period[2] * _turns_round(x[2], corner[2], period[2]),
+        turns = (
+            _turns_round(x[0], corner[0], period[0]),
+            _turns_round(x[1], corner[1], period[1]),
+            _turns_round(x[2], corner[2], period[2]),
         )
+        if turns != (0, 0, 0):
+            for axis in range(3):
+                image[i, axis] += turns[axis]
+            x = x[0] - period[0] * turns[0], x[1] - period[1] * turns[1], x[2] - period[2] * turns[2]
         put(position, i, x)
         put4(orientation, i, q)
         put(velocity, i, v)
@@ -64,43 +67,17 @@ def fly_on(constants, state, world, clock, acceleration, anchor, leash, duration
 
 
 @kernel
-def all_on_leash(log_piece, particle, state, clock, acceleration, anchor, leash, period, duration, first_piece, met):
-    """Whether particles that met something stayed on their leashes: at each impact, and flying on to the end.
-
-    A parabola between two of these points is farther out than both by at most a t^2 / 8.
-    """
-    for m in range(first_piece, len(particle)):
-        i = particle[m]
-        where = log_piece[m, 1], log_piece[m, 2], log_piece[m, 3]
-        bulge = 0.125 * norm(row(acceleration, i)) * duration * duration
-        if norm(nearest_image(sub(where, row(anchor, i)), period)) + bulge > leash[i]:
-            return False
-    for i in met:
-        time = duration - clock[i]
-        x, v, a = row(state.position, i), row(state.velocity, i), row(acceleration, i)
-        way = (
-            v[0] * time + 0.5 * a[0] * time * time,
-            v[1] * time + 0.5 * a[1] * time * time,
-            v[2] * time + 0.5 * a[2] * time * time,
-        )
-        end = x[0] + way[0], x[1] + way[1], x[2] + way[2]
-        bulge = 0.125 * norm(a) * time * time
-        if norm(nearest_image(sub(end, row(anchor, i)), period)) + bulge > leash[i]:
-            return False
-    return True
-
-
-@kernel
-def paces(constants, state, world, out, rows):
-    """Sums over blocks of ``rows`` particles: how fast surfaces move, and gravity pulls, in bounding radii.
+def paces(constants, state, world, out, rows, first, last):
+    """Sums over blocks ``first .. last`` of ``rows`` particles: how fast surfaces move, and gravity pulls, in radii.
 
     ``out`` (blocks, 2) [1/s], [1/s^2]. Returns the largest speed [m/s].
     """
-    velocity, orientation, momentum = state.velocity, state.orientation, state.angular_momentum
-    inertia, radius = constants.inertia, constants.radius
+    velocity, orientation, momentum, inertia, radius = borrowed(
+        (state.velocity, state.orientation, state.angular_momentum, constants.inertia, constants.radius)
+    )
     g = norm(vector(world.gravity))
     fastest = 0.0
-    for block in range(len(out)):
+    for block in range(first, last):
         pace = pull = 0.0
         for i in range(block * rows, min((block + 1) * rows, len(radius))):
             speed2 = dot(row(velocity, i), row(velocity, i))

@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from particlesim.impacts.course import Course
 from particlesim.jit import kernel
 
 
 class Islands(NamedTuple):
-    """The members of island ``k`` are ``member[start[k]:start[k + 1]]``, in ascending order, as are the islands."""
+    """The members of island ``k`` are ``member[start[k]:start[k + 1]]``."""
 
     start: np.ndarray  # (k + 1,) int64
     member: np.ndarray  # (m,) int64
@@ -26,37 +27,80 @@ def _island_of(island, i):
 
 
 @kernel
-def _unite(island, met):
+def _unite(island, ring, met):
     """Join the islands of particles that meet; ``island`` (n,) leads from each to a smaller one or itself.
 
-    (R. E. Tarjan, Journal of the ACM 22 (1975) 215-225.)
+    (R. E. Tarjan, Journal of the ACM 22 (1975) 215-225.) ``ring`` leads round the members of an island: two rings
+    become one by an exchange of what follows two of their members.
     """
     for k in range(len(met)):
         i, j = met[k, 0], met[k, 1]
         if j >= 0:
             a, b = _island_of(island, i), _island_of(island, j)
-            island[max(a, b)] = min(a, b)
+            if a != b:
+                island[max(a, b)] = min(a, b)
+                ring[a], ring[b] = ring[b], ring[a]
 
 
 @kernel
-def _settle(island, particles):
-    """Let each of the particles point to the smallest of its island itself."""
-    for i in particles:
-        island[i] = _island_of(island, i)
+def _gather(island, ring, listed, met):
+    """The islands of the first partners of pairs, in the order of the pairs, and their members: (starts, members)."""
+    islands = members = 0
+    for k in range(len(met)):
+        root = _island_of(island, met[k, 0])
+        if not listed[root]:
+            islands += 1
+            i = root
+            while not listed[i]:
+                listed[i] = True
+                members += 1
+                i = ring[i]
+    start, member = np.empty(islands + 1, dtype=np.int64), np.empty(members, dtype=np.int64)
+    islands = members = 0
+    for k in range(len(met)):
+        root = _island_of(island, met[k, 0])
+        if listed[root]:
+            start[islands] = members
+            islands += 1
+            i = root
+            while listed[i]:
+                listed[i] = False
+                island[i] = root
+                member[members] = i
+                members += 1
+                i = ring[i]
+    start[islands] = members
+    return start, member
 
 
-def unite(island: np.ndarray, met: np.ndarray, particles: np.ndarray) -> Islands:
-    """Join the islands of pairs that meet, and gather all those of the ``particles`` (ascending) that these concern.
+def unite(course: Course, met: np.ndarray) -> Islands:
+    """Join the islands of pairs (m, 2) that meet, and gather all that these concern."""
+    _unite(course.island, course.ring, met)
+    return Islands(*_gather(course.island, course.ring, course.listed, met))
 
-    ``island`` (n,) is brought up to date for all ``particles``, which must hold all that ever met anything.
-    """
-    _unite(island, met)
-    _settle(island, particles)
-    concerned = np.unique(island[met[:, 0]])
-    roots = island[particles]
-    chosen = np.isin(roots, concerned) if len(concerned) < len(roots) else np.ones(len(roots), dtype=np.bool_)
-    roots, member = roots[chosen], particles[chosen]
-    order = np.argsort(roots, kind="stable")
-    roots, member = roots[order], member[order]
-    edges = np.flatnonzero(np.diff(roots, prepend=-1, append=-1))
-    return Islands(edges, member)
+
+@kernel
+def newly_touched(touched, met):
+    """Mark the particles of pairs in ``touched`` (n,) bool; those that were not marked, in the order of the pairs."""
+    new = np.empty(2 * len(met), dtype=np.int64)
+    count = 0
+    for k in range(len(met)):
+        for side in range(2):
+            i = met[k, side]
+            if i >= 0 and not touched[i]:
+                touched[i] = True
+                new[count] = i
+                count += 1
+    return new[:count]
+
+
+@kernel
+def add_up(tally, island, touched):
+    """The sum over islands, in the order of the particles ``touched``, of the rows of ``tally``, which become 0."""
+    total = np.zeros(tally.shape[1])
+    for i in touched:
+        for column in range(tally.shape[1]):
+            if island[i] == i:
+                total[column] += tally[i, column]
+            tally[i, column] = 0.0
+    return total

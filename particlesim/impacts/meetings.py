@@ -6,16 +6,20 @@ import math
 
 import numpy as np
 
-from particlesim.constants import MAX_MANIFOLD
+from particlesim.constants import MAX_MANIFOLD, WALL
 from particlesim.crew import Crew
 from particlesim.impacts.course import Course, Log, path_of_piece, path_of_state
-from particlesim.impacts.neighbours import Neighbours
+from particlesim.impacts.neighbours import Neighbours, around_of, far_apart
 from particlesim.impacts.next_impact import body_of, later, pair_meets, wall_meets
-from particlesim.impacts.sieve import sieve
+from particlesim.impacts.sieve import balls, free_way, grown, sieve, sieve_walls
 from particlesim.jit import borrowed, kernel
 from particlesim.narrow_phase.contacts import wall_of_partner
+from particlesim.narrow_phase.pair import nearest_image
 from particlesim.state import Constants, ShapeTable, State, World
-from particlesim.vec import row
+from particlesim.vec import along, norm, row, sub
+
+# To look into a pair takes as long as other work on so many particles.
+_LOOK = 16
 
 Where = tuple[ShapeTable, World, Constants, State, Course, Log]
 
@@ -86,49 +90,120 @@ def _look_closer(table, world, constants, state, course, log, pairs, times, dura
 
 
 @kernel
-def _across(island, start, other, whom):
-    """Pairs (m, 2), the smaller first, of particles ``whom`` with neighbours of other islands."""
+def _across(island, head, first_piece, ball, period, lists, whom, first, last):
+    """Pairs (m, 2), the smaller first, of particles ``whom[first:last]`` with others of other islands they may meet.
+
+    ``whom`` are all those whose pieces of path begin with ``first_piece`` or later; pairs among them stand there once.
+    """
+    island, head, ball, lists, whom = borrowed((island, head, ball, lists, whom))
+    particle, place, start, other = lists
+    around = around_of(period)
+    pairs = np.empty((256, 2), dtype=np.int64)
     count = 0
-    for i in whom:
-        count += start[i + 1] - start[i]
-    pairs = np.empty((count, 2), dtype=np.int64)
-    count = 0
-    for i in whom:
-        for near in range(start[i], start[i + 1]):
-            j = other[near]
-            if island[j] != island[i]:
+    for k in range(first, last):
+        i = whom[k]
+        p = place[i]
+        while count + start[p + 1] - start[p] > len(pairs):
+            pairs = grown(pairs)
+        for near in range(start[p], start[p + 1]):
+            if far_apart(ball, p, other[near], around):
+                continue
+            j = particle[other[near]]
+            if island[j] != island[i] and (j > i or head[j] < first_piece):
                 pairs[count, 0], pairs[count, 1] = min(i, j), max(i, j)
                 count += 1
     return pairs[:count]
 
 
+@kernel
+def _is_near(position, anchor, leash, bulge, period, i):
+    """Whether a place is on the leash of particle ``i``, and the tops of parabolas to and from there are."""
+    return norm(nearest_image(sub(position, row(anchor, i)), period)) + bulge <= leash[i]
+
+
+@kernel
+def _follow_paths(
+    log_piece, following, head, state, acceleration, radius, place, anchor, leash, period, duration, ball, whom,
+    first, last,
+):  # fmt: skip
+    """See ``follow_paths``, of particles ``whom[first:last]``.
+
+    A parabola between two points on it is farther out than both by at most a t^2 / 8.
+    """
+    log_piece, following, head, state, acceleration = borrowed((log_piece, following, head, state, acceleration))
+    radius, place, anchor, leash, ball, whom = borrowed((radius, place, anchor, leash, ball, whom))
+    on_leash = True
+    for k in range(first, last):
+        i = whom[k]
+        piece, way = head[i], 0.0
+        if piece < 0:
+            way = free_way(row(state.velocity, i), row(acceleration, i), duration)
+        while piece >= 0:
+            after = following[piece]
+            time = (log_piece[after, 0] if after >= 0 else duration) - log_piece[piece, 0]
+            position, _, velocity, _, pull = path_of_piece(log_piece, piece)
+            way += free_way(velocity, pull, time)
+            bulge = 0.125 * norm(pull) * time * time
+            end = along(along(position, velocity, time), pull, 0.5 * time * time)
+            on_leash = on_leash and _is_near(position, anchor, leash, bulge, period, i)
+            on_leash = on_leash and _is_near(end, anchor, leash, bulge, period, i)
+            piece = after
+        ball[place[i], 3] = radius[i] + way
+    return on_leash
+
+
+def follow_paths(where: Where, neighbours: Neighbours, ball: np.ndarray, whom: np.ndarray, duration: float) -> bool:
+    """Let the balls of particles ``whom`` hold the paths they have taken; whether these stayed on their leashes."""
+    _, world, constants, state, course, log = where
+    at = neighbours
+    arguments = (
+        log.piece, log.following, course.head, state, course.acceleration, constants.radius,
+        at.lists.place, at.anchor, at.leash, world.period, duration, ball, whom,
+    )  # fmt: skip
+    return all(Crew(len(whom)).each(lambda _, first, last: _follow_paths(*arguments, first, last), len(whom)))
+
+
 def _met(where: Where, pairs: np.ndarray, times: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:
     """Those of the pairs that meet, and when, with the times of -1 filled in."""
-    with Crew(len(pairs)) as crew:
-        crew.each(lambda _, first, last: _look_closer(*where, pairs, times, duration, first, last), len(pairs))
+    crew = Crew(_LOOK * len(pairs))
+    crew.each(lambda _, first, last: _look_closer(*where, pairs, times, duration, first, last), len(pairs))
     meet = times < np.inf
     return pairs[meet], times[meet]
 
 
-def first_meetings(where: Where, neighbours: Neighbours, duration: float) -> tuple[np.ndarray, np.ndarray]:
-    """Who meets whom within ``duration`` [s] if all go on as they are: pairs (m, 2), sorted by the first, times (m,).
+def first_meetings(
+    where: Where, neighbours: Neighbours, ball: np.ndarray, duration: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Who meets whom within ``duration`` [s] if all go on as they are: pairs (m, 2), sorted, and times (m,).
 
-    Partners below 0 are walls.
+    Partners below 0 are walls. ``ball`` (n, 8) is filled in (see sieve.py).
     """
     table, world, constants, state, course, _ = where
-    count = len(constants.radius)
-    arguments = (
-        table.kind, constants.shape, constants.radius, state.position, state.velocity, course.acceleration,
-        world.lower, world.upper, world.boundary, world.period, neighbours.start, neighbours.other, duration,
-    )  # fmt: skip
-    with Crew(count) as crew:
-        parts = crew.each(lambda _, first, last: sieve(*arguments, first, last), count)
+    count, at = len(constants.radius), neighbours
+    moving = constants.radius, state.position, state.velocity, course.acceleration
+    crew = Crew(count)
+    alike = all(crew.each(lambda _, first, last: balls(*moving, at.lists.place, duration, ball, first, last), count))
+    among = course.acceleration, alike, ball, at.lists.particle, at.later_start, at.later, world.period, duration
+    parts = crew.each(lambda _, first, last: sieve(table.kind, constants.shape, *among, first, last), count)
+    if (world.boundary == WALL).any():
+        walls = table.kind, constants.shape, *moving, world.lower, world.upper, world.boundary, duration
+        parts += crew.each(lambda _, first, last: sieve_walls(*walls, first, last), count)
     pairs, times = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    return _met(where, pairs, times, duration)
+    pairs, times = _met(where, pairs, times[:, 0], duration)
+    order = np.argsort(pairs[:, 0] * (count + 6) + pairs[:, 1])
+    return pairs[order], times[order]
 
 
-def missed_meetings(where: Where, neighbours: Neighbours, whom: np.ndarray, duration: float) -> np.ndarray:
-    """Pairs (m, 2) that particles ``whom`` make with others of other islands, whatever either has met meanwhile."""
-    pairs = _across(where[4].island, neighbours.start, neighbours.other, whom)
+def missed_meetings(
+    where: Where, neighbours: Neighbours, ball: np.ndarray, whom: np.ndarray, first_piece: int, duration: float
+) -> np.ndarray:
+    """Pairs (m, 2) that particles ``whom`` make with others of other islands, whatever either has met meanwhile.
+
+    ``whom`` are all those whose pieces of path begin with ``first_piece`` or later.
+    """
+    _, world, _, _, course, _ = where
+    arguments = course.island, course.head, first_piece, ball, world.period, neighbours.lists, whom
+    parts = Crew(len(whom)).each(lambda _, first, last: _across(*arguments, first, last), len(whom))
+    pairs = np.concatenate(parts)
     met, _ = _met(where, pairs, np.full(len(pairs), -1.0), duration)
     return met

@@ -172,10 +172,11 @@ def _pressed_walls(world):
 
 
 @kernel
-def find_resting(table, world, constants, state, start, other):
+def find_resting(table, world, constants, state, lists):
     """Contact points that may rest, and their partners (m, 2): on walls, and all that hangs together with these."""
     table, world, constants, state = borrowed((table, world, constants, state))
     position, radius = state.position, constants.radius
+    particle, place, start, other = lists
     count = len(radius)
     points, gaps = np.empty((MAX_MANIFOLD, 3)), np.empty(MAX_MANIFOLD)
     partner, point = np.empty((64, 2), dtype=np.int64), np.empty((64, COLUMNS))
@@ -202,15 +203,16 @@ def find_resting(table, world, constants, state, start, other):
         i = waiting[next_one]
         next_one += 1
         reached[i] = 2
-        while size + MAX_MANIFOLD * (6 + start[i + 1] - start[i]) > len(partner):
+        here = place[i]
+        while size + MAX_MANIFOLD * (6 + start[here + 1] - start[here]) > len(partner):
             partner, point = grown(partner), grown(point)
         for wall in range(6):
             if world.boundary[wall // 2] == WALL:
                 size = _add_contact(
                     table, world, constants, state, i, wall_as_partner(wall), points, gaps, partner, point, size
                 )
-        for near in range(start[i], start[i + 1]):
-            j = other[near]
+        for near in range(start[here], start[here + 1]):
+            j = particle[other[near]]
             if reached[j] == 2:
                 continue
             more = _add_contact(
@@ -312,7 +314,7 @@ class Resting:
             return
         constants, state = self._constants, self._state
         acceleration[self._held] = self._world.gravity
-        partner, point = find_resting(self._table, self._world, constants, state, neighbours.start, neighbours.other)
+        partner, point = find_resting(self._table, self._world, constants, state, neighbours.lists)
         self._held = np.unique(partner[partner >= 0])
         self._before = state.velocity[self._held], state.angular_momentum[self._held]
         self.wall_impulse, self.virial = np.zeros(6), 0.0

@@ -1,7 +1,8 @@
 """The first look at all pairs: spheres are told by the closed form, most others by their bounding spheres.
 
-Nearly all the time of a step with few impacts is spent here, so it works on plain arrays and reads no more of a
-particle than it needs.
+Every particle has a ball that it cannot leave within the stretch of time, whatever it meets: about where it starts, as
+much larger than its bounding sphere as it goes. The balls lie in the order of the places, so that those of neighbours
+are in the cache, and nine of ten pairs need no more than them.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import math
 import numpy as np
 
 from particlesim.constants import SPHERE, WALL
+from particlesim.impacts.neighbours import around_of, far_apart
 from particlesim.impacts.time_of_impact import sphere_meets_wall, spheres_meet
 from particlesim.jit import borrowed, kernel
 from particlesim.narrow_phase.contacts import wall_as_partner
@@ -28,6 +30,34 @@ def grown(array):
     return longer
 
 
+@kernel
+def free_way(velocity, acceleration, time):
+    """How far a particle goes within ``time`` [s] at the most."""
+    return (norm(velocity) + 0.5 * norm(acceleration) * time) * time
+
+
+@kernel
+def balls(radius, position, velocity, acceleration, place, duration, ball, first, last):
+    """Rows (n, 8) of ``ball``, by place, of particles ``first .. last`` that go straight on for ``duration`` [s].
+
+    Position, radius of the ball, velocity, radius of the particle. Returns whether all accelerate as particle 0 does.
+    """
+    radius, position, velocity, acceleration = borrowed((radius, position, velocity, acceleration))
+    place, ball = borrowed((place, ball))
+    pull = row(acceleration, 0)
+    alike = True
+    for i in range(first, last):
+        p = place[i]
+        own = row(acceleration, i)
+        alike = alike and own[0] == pull[0] and own[1] == pull[1] and own[2] == pull[2]
+        for axis in range(3):
+            ball[p, axis] = position[i, axis]
+            ball[p, 4 + axis] = velocity[i, axis]
+        ball[p, 3] = radius[i] + free_way(row(velocity, i), own, duration)
+        ball[p, 7] = radius[i]
+    return alike
+
+
 @kernel(inline=True)
 def _list(found, times, count, i, j, time):
     found[count, 0] = i
@@ -37,72 +67,73 @@ def _list(found, times, count, i, j, time):
 
 
 @kernel
-def sieve(
-    kind,
-    shape,
-    radius,
-    position,
-    velocity,
-    acceleration,
-    lower,
-    upper,
-    boundary,
-    period,
-    start,
-    other,
-    duration,
-    first,
-    last,
-):
-    """Pairs of particles ``first .. last`` with later neighbours and with walls that meet, or may, in ``duration`` [s].
+def _pair_time(spheres, ball, p, q, period, duration):
+    """When the particles at two places meet that accelerate alike; -1 where that must be looked into."""
+    offset = nearest_image(sub(row(ball, q), row(ball, p)), period)
+    velocity = ball[q, 4] - ball[p, 4], ball[q, 5] - ball[p, 5], ball[q, 6] - ball[p, 6]
+    reach = ball[p, 7] + ball[q, 7]
+    time = spheres_meet(offset, velocity, reach, duration)
+    if time == 0.0 or (not spheres and (time < math.inf or dot(offset, offset) <= reach * reach)):
+        time = -1.0
+    return time
 
-    Returns (m, 2) and times (m, 1): when they meet, or -1 where the bounding spheres come together and more must be
-    known.
+
+@kernel
+def sieve(kind, shape, acceleration, alike, ball, particle, later_start, later, period, duration, first, last):
+    """Pairs (m, 2), i < j, of places ``first .. last`` with later neighbours that meet, or may, in ``duration`` [s].
+
+    And times (m, 1): when they meet, or -1 where the bounding spheres come together and more must be known. Where not
+    all are known to accelerate ``alike``, it is looked at for each pair.
     """
+    kind, shape, acceleration, ball, particle = borrowed((kind, shape, acceleration, ball, particle))
+    later_start, later, period = borrowed((later_start, later, period))
+    around = around_of(period)
+    found, times = np.empty((256, 2), dtype=np.int64), np.empty((256, 1))
+    count = 0
+    for p in range(first, last):
+        while count + later_start[p + 1] - later_start[p] > len(found):
+            found, times = grown(found), grown(times)
+        for near in range(later_start[p], later_start[p + 1]):
+            q = later[near]
+            if far_apart(ball, p, q, around):
+                continue
+            one, two = (p, q) if particle[p] < particle[q] else (q, p)
+            i, j = particle[one], particle[two]
+            pull = sub(row(acceleration, j), row(acceleration, i)) if not alike else (0.0, 0.0, 0.0)
+            time = -1.0
+            if pull[0] == 0.0 and pull[1] == 0.0 and pull[2] == 0.0:
+                spheres = kind[shape[i]] == SPHERE and kind[shape[j]] == SPHERE
+                time = _pair_time(spheres, ball, one, two, period, duration)
+            if time < math.inf:
+                count = _list(found, times, count, i, j, time)
+    return found[:count], times[:count]
+
+
+@kernel
+def sieve_walls(
+    kind, shape, radius, position, velocity, acceleration, lower, upper, boundary, duration, first, last
+):  # fmt: skip
+    """As ``sieve``, of particles ``first .. last`` with walls, which are partners below 0."""
     kind, shape, radius, position, velocity, acceleration = borrowed(
         (kind, shape, radius, position, velocity, acceleration)
     )
-    lower, upper, boundary, period, start, other = borrowed((lower, upper, boundary, period, start, other))
     found, times = np.empty((256, 2), dtype=np.int64), np.empty((256, 1))
     count = 0
-    walls = boundary[0] == WALL or boundary[1] == WALL or boundary[2] == WALL
     for i in range(first, last):
-        while count + 6 + start[i + 1] - start[i] > len(found):
+        if count + 6 > len(found):
             found, times = grown(found), grown(times)
-        x, v, a, r = row(position, i), row(velocity, i), row(acceleration, i), radius[i]
-        round_i = kind[shape[i]] == SPHERE
-        for near in range(start[i], start[i + 1]):
-            j = other[near]
-            if j < i:
-                continue
-            offset = nearest_image(sub(row(position, j), x), period)
-            apart = sub(row(velocity, j), v)
-            pull = sub(row(acceleration, j), a)
-            reach = r + radius[j]
-            alike = pull[0] == 0.0 and pull[1] == 0.0 and pull[2] == 0.0
-            way = norm(apart) * duration
-            if not alike:
-                way += 0.5 * norm(pull) * duration * duration
-            if dot(offset, offset) > (reach + way) * (reach + way):
-                continue
-            time = -1.0
-            if alike:
-                time = spheres_meet(offset, apart, reach, duration)
-                inside = dot(offset, offset) <= reach * reach
-                spheres = round_i and kind[shape[j]] == SPHERE
-                if time == 0.0 or (not spheres and (inside or time < math.inf)):
+        x, v, a = row(position, i), row(velocity, i), row(acceleration, i)
+        way = free_way(v, a, duration)
+        for wall in range(6):
+            axis = wall // 2
+            if boundary[axis] == WALL:
+                room = (upper[axis] - x[axis] if wall % 2 else x[axis] - lower[axis]) - radius[i]
+                if room > way:
+                    continue
+                sign = 2.0 * (wall % 2) - 1.0
+                time = sphere_meets_wall(room, sign * v[axis], sign * a[axis], duration)
+                if time == 0.0 or (kind[shape[i]] != SPHERE and (time < math.inf or room < 0.0)):
                     time = -1.0
-            if time < math.inf:
-                count = _list(found, times, count, i, j, time)
-        if walls:
-            for wall in range(6):
-                axis = wall // 2
-                if boundary[axis] == WALL:
-                    sign = 2.0 * (wall % 2) - 1.0
-                    room = (upper[axis] - x[axis] if wall % 2 else x[axis] - lower[axis]) - r
-                    time = sphere_meets_wall(room, sign * v[axis], sign * a[axis], duration)
-                    if time == 0.0 or (not round_i and (time < math.inf or room < 0.0)):
-                        time = -1.0
-                    if time < math.inf:
-                        count = _list(found, times, count, i, wall_as_partner(wall), time)
-    return found[:count], times[:count, 0]
+                if time < math.inf:
+                    count = _list(found, times, count, i, wall_as_partner(wall), time)
+    return found[:count], times[:count]

@@ -247,17 +247,17 @@ def _longest_proven_step(
 
     Where it ``stands``, as that of a wall, it must not turn.
     """
+    step = (gap, offset, velocity, speed, bend, most)
+    longest = _step_of_turning(vertex, range_i, body_i, range_j, body_j, normal, (0.0, 0.0, 0.0), *step)
+    if longest >= most or stands:
+        return longest
     with_i, with_j = cross(body_i[2], normal), cross(body_j[2], normal)
     edge_i = _facing_edge(vertex, range_i[0], range_i[1], rotate_back(body_i[1], normal))
     edge_j = _facing_edge(vertex, range_j[0], range_j[1], rotate_back(body_j[1], scaled(normal, -1.0)))
     with_both = _turning_with_edges(rotate(body_i[1], edge_i), with_i, rotate(body_j[1], edge_j), with_j, normal)
-    longest = 0.0
-    for turning in ((0.0, 0.0, 0.0), with_i, with_j, with_both):
-        if longest < most and not (stands and norm(turning) > 0.0):
-            step = _step_of_turning(
-                vertex, range_i, body_i, range_j, body_j, normal, turning, gap, offset, velocity, speed, bend, most
-            )
-            longest = max(longest, step)
+    for turning in (with_i, with_j, with_both):
+        if longest < most:
+            longest = max(longest, _step_of_turning(vertex, range_i, body_i, range_j, body_j, normal, turning, *step))
     return longest
 
 
@@ -274,13 +274,12 @@ def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wal
     range_j = vertex_start[body_j[0]], vertex_start[body_j[0] + 1]
     sizes, radii = body_i[1] + body_j[1], body_i[2] + body_j[2]
     velocity, acceleration = sub(path_j[2], path_i[2]), sub(path_j[4], path_i[4])
-    bend = _bend(kind_i, body_i, path_i) + _bend(kind_j, body_j, path_j)
-    turning = _fastest_corner(body_i, path_i) + _fastest_corner(body_j, path_j)
+    turning = _fastest_corner(body_i, path_i)
     if wall >= 0:
         range_j, sizes, radii = (0, 0), body_i[1], body_i[2]
         velocity, acceleration = scaled(path_i[2], -1.0), scaled(path_i[4], -1.0)
-        bend, turning = _bend(kind_i, body_i, path_i), _fastest_corner(body_i, path_i)
-    bend += norm(acceleration)
+    else:
+        turning += _fastest_corner(body_j, path_j)
     way = norm(velocity) + norm(acceleration) * end
     time = start
     for _ in range(_MAX_LOOKS):
@@ -297,6 +296,15 @@ def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wal
         gap += sunk
         if gap <= IMPACT_TOLERANCE * sizes:
             return time
+        left = end - time
+        now = along(velocity, acceleration, time)
+        # Most are so far apart that not even their fastest corners close the gap.
+        closing = turning + max(0.0, -dot(now, normal)) + norm(acceleration) * left
+        if gap - IMPACT_TOLERANCE * sizes > closing * left:
+            return math.inf
+        bend = norm(acceleration) + _bend(kind_i, body_i, path_i)
+        if wall < 0:
+            bend += _bend(kind_j, body_j, path_j)
         step = _longest_proven_step(
             vertex,
             range_i,
@@ -307,12 +315,12 @@ def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wal
             wall >= 0,
             gap,
             offset,
-            along(velocity, acceleration, time),
-            (way + turning, norm(offset) + radii + way * (end - time)),
+            now,
+            (way + turning, norm(offset) + radii + way * left),
             bend,
-            end - time,
+            left,
         )
-        if step >= end - time:
+        if step >= left:
             return math.inf
         time += step
     return time

@@ -85,11 +85,11 @@ def touching_pairs(
 ) -> np.ndarray:
     """The candidate pairs (m, 2) that touch or overlap, in the order of ``pairs``."""
     touches = np.empty(len(pairs), dtype=np.bool_)
-    with Crew(len(pairs)) as crew:
-        crew.each(
-            lambda _, first, last: _mark_touching(table, world, constants, state, pairs, touches, first, last),
-            len(pairs),
-        )
+    crew = Crew(len(pairs))
+    crew.each(
+        lambda _, first, last: _mark_touching(table, world, constants, state, pairs, touches, first, last),
+        len(pairs),
+    )
     return pairs[touches]
 
 

@@ -12,11 +12,12 @@ from particlesim.vec import add, matrix_of, put, row, scaled
 def nearest_image(offset, period):
     """An offset between two particles, by the shortest way round each periodic axis."""
     x, y, z = offset
-    if period[0] > 0.0:
+    # Few pairs lie on two sides of a face: the others are spared the division.
+    if abs(x) > 0.5 * period[0] and period[0] > 0.0:
         x -= period[0] * round(x / period[0])
-    if period[1] > 0.0:
+    if abs(y) > 0.5 * period[1] and period[1] > 0.0:
         y -= period[1] * round(y / period[1])
-    if period[2] > 0.0:
+    if abs(z) > 0.5 * period[2] and period[2] > 0.0:
         z -= period[2] * round(z / period[2])
     return x, y, z
 
