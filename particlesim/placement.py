@@ -147,7 +147,7 @@ def _on_lattice(
 def _round_lattice(
     lower: np.ndarray, upper: np.ndarray, count: int, spacing: float | None, room: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """As ``lattice_points``, but those nearest to the middle of the ellipsoid in a box; particles span ``room`` (3,)."""
+    """As ``lattice_points``, but those nearest to the middle of an ellipsoid in a box; particles span ``room`` (3,)."""
     edges = upper - lower
     tried = spacing or float((np.pi / 6.0 * edges.prod() / count) ** (1.0 / 3.0))
     while True:

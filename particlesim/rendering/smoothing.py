@@ -30,9 +30,9 @@ def smooth_edges(image: np.ndarray) -> np.ndarray:
     height, width = image.shape[:2]
     bright = np.empty((height, width), dtype=np.float32)
     smooth = np.empty((height, width, 3), dtype=np.uint8)
-    with Crew(height * width) as crew:
-        crew.each(lambda _, first, last: _brightness(image, bright, first, last), height)
-        crew.each(lambda _, first, last: _smooth(image, bright, smooth, first, last), height)
+    crew = Crew(height * width)
+    crew.each(lambda _, first, last: _brightness(image, bright, first, last), height)
+    crew.each(lambda _, first, last: _smooth(image, bright, smooth, first, last), height)
     return smooth
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from particlesim.crew import Crew
 from particlesim.jit import kernel
+from particlesim.rendering.bodies import Bodies
 from particlesim.rendering.outlook import Outlook, nearest_first
 
 # Edge of the squares of the picture that are noted as holding spheres [pixels].
@@ -29,19 +30,6 @@ _MOVED = 1.0 / 128.0
 
 # Closeness is kept in single precision: what is nearer by less than this share is not hidden.
 _ROUNDING = 1e-6
-
-
-class Bodies(NamedTuple):
-    """What particles look like: ``inner`` and ``outer`` (n,) radii of spheres within and about each [m], the same for
-    spheres alone; ``size`` (n,) [m]; ``start`` (n,) and ``faces`` (n,) int64: its first row of
-    ``planes`` (p, 4) float64 and their number, of a hull of size 1: outward normal and distance from the middle."""
-
-    inner: np.ndarray
-    outer: np.ndarray
-    size: np.ndarray
-    start: np.ndarray
-    faces: np.ndarray
-    planes: np.ndarray
 
 
 class Sight(NamedTuple):
@@ -83,11 +71,9 @@ def look(outlook: Outlook, bodies: Bodies, position: np.ndarray, orientation: np
         _look(balls, order, bodies, orientation, axes, outlook.parallel, window, sides, close, owner, tiles, seen)
         return seen
 
-    with Crew(len(position)) as crew:
-        crew.each(gather, len(position))
+    Crew(len(position)).each(gather, len(position))
     # What hides what in a strip of the picture is told by that strip alone.
-    with Crew(close.size) as crew:
-        seen = np.logical_or.reduce(crew.each(strip, tiles.shape[1]))
+    seen = np.logical_or.reduce(Crew(close.size).each(strip, tiles.shape[1]))
     return Sight(close, owner, tiles, order[seen])
 
 
