@@ -26,6 +26,8 @@ FLOORS = [
         "survey",
         "diagnosis",
         "bench",
+        "drawing_bench",
+        "vtk_pictures",
         "commands",
         "cli",
         "__main__",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from particlesim.bench import Speed
     from particlesim.compare.command import Report
+    from particlesim.drawing_bench import Drawn
     from particlesim.summary import Summary
 
 
@@ -66,6 +67,26 @@ def print_speeds(speeds: list[Speed]) -> None:
         "impacts: a particle and step; bytes: a particle, at the most",
     ):
         console.print(line, style="dim", highlight=False)
+
+
+def print_pictures(pictures: list[Drawn]) -> None:
+    """What a benchmark of drawing measured: a row for each crowd, a column for each that drew it."""
+    from rich.console import Console  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+
+    from particlesim.drawing_bench import SIZE  # noqa: PLC0415
+
+    drawers = list(dict.fromkeys(drawn.drawer for drawn in pictures))
+    crowds = list(dict.fromkeys((drawn.kind, drawn.particles) for drawn in pictures))
+    seconds = {(drawn.kind, drawn.particles, drawn.drawer): drawn.median for drawn in pictures}
+    table = Table(title=f"Seconds a picture of {SIZE[0]}x{SIZE[1]}", title_justify="left", box=None, pad_edge=False)
+    for name in ("", "particles", *drawers):
+        table.add_column(name, justify="right" if name else "left", no_wrap=True)
+    for kind, count in crowds:
+        table.add_row(kind, f"{count:,}", *(f"{seconds[kind, count, drawer]:.3f}" for drawer in drawers))
+    console = Console()
+    console.print(table)
+    console.print("medians; ours with shadows and smooth edges, VTK without", style="dim", highlight=False)
 
 
 def print_summary(summary: Summary, path: Path) -> None:

@@ -72,9 +72,13 @@ def _smooth(image, bright, smooth, first, last):
                 around = (2.0 * (n + s + e + w) + ne + nw + se + sw) / 12.0
                 sticks_out = min(abs(around - here) / (most - least), 1.0)
                 share = max(share, _SUBDUED * sticks_out * sticks_out)
-            for channel in range(3):
-                own, other = image[row, column, channel], image[down, across, channel]
-                smooth[out, column, channel] = np.uint8(own + share * (float(other) - own) + 0.5)
+            if share == 0.0:
+                for channel in range(3):
+                    smooth[out, column, channel] = image[row, column, channel]
+            else:
+                for channel in range(3):
+                    own, other = image[row, column, channel], image[down, across, channel]
+                    smooth[out, column, channel] = np.uint8(own + share * (float(other) - own) + 0.5)
 
 
 @kernel
