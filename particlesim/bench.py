@@ -32,11 +32,11 @@ LARGE = 1_000_000
 # Measurements a gas: their median is told, and how far they lie apart.
 MEASUREMENTS = 5
 
-# Each measurement takes at least so long [s] and so many steps: the neighbours are found anew every second step or so.
-LEAST_SECONDS, _LEAST_STEPS = 1.0, 4
+# Each measurement takes at least so long [s] and so many steps: the neighbours are found anew every fifth step or so.
+LEAST_SECONDS, _LEAST_STEPS = 1.0, 10
 
-# Steps before the first measurement: leashes and buffers get their sizes.
-_STEPS_BEFORE = 4
+# Steps before the first measurement: leashes and buffers get their sizes, and neighbours have been found anew.
+_STEPS_BEFORE = 6
 
 # A gas of so many is run first, for its kernels to be compiled and loaded.
 _FEW = 100

@@ -72,5 +72,5 @@ RESTING_SINKING = 1e-5
 
 # A particle may get this fraction of its radius away from where it was when its neighbours were looked up, and half
 # as far again as it flies in one stretch of time, before they are looked up anew. Longer leashes make longer lists,
-# shorter ones make them more often: in gases from 0.5 to 1 the time is about the same.
+# which take time in every stretch and memory; shorter ones must be made more often.
 LEASH = 0.6

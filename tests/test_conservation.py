@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from particlesim import crew
+from particlesim.constants import LONGEST_STRETCH
 from particlesim.narrow_phase.contacts import deepest_overlap
 from particlesim.simulation import Simulation
 from tests.brute_force import Spheres
@@ -282,6 +283,30 @@ def test_thin_boxes_that_spin_fast_between_walls_stay_there():
         assert (np.abs(sim.particles.position) < 1.0).all()
     assert sim.ledger.impacts > 15
     assert sim.ledger.energy == pytest.approx(before, rel=1e-12)
+
+
+def test_a_ball_knocked_far_off_is_followed_while_others_meet_unforeseen():
+    """In one stretch of time: a light ball at rest, knocked to where it had no neighbours, hits the ball there; and a
+    ball struck aside hits a neighbour that nobody was heading for."""
+    heavy = listed("sphere", {"position": (-3, 0, 0), "velocity": (100, 0, 0)}, mass=1e6)
+    far = listed("sphere", {"position": (0, 0, 0)}, {"position": (9, 0, 0)}, mass=1.0)
+    aside = [
+        {"position": (0, 50, 0), "velocity": (20, 0, 0)},
+        {"position": (2, 50.6, 0)},
+        {"position": (2.96, 51.32, 0)},
+    ]
+    # The mean speed says how long a stretch may be: these hardly have any.
+    resting = [{"position": (3.0 * k, 0, -40)} for k in range(-60, 60)]
+    balls = listed("sphere", *aside, *resting, mass=1.0)
+    sim = Simulation(scene(heavy, far, balls, size=(400, 400, 400), boundary="open", step=0.09))
+    assert sim._flight.longest_stretch(LONGEST_STRETCH) > 0.09
+    sim.step()
+    velocity = sim.particles.velocity
+    assert sim.ledger.impacts == 4
+    assert np.allclose(velocity[1:3, 0], (0.0, 200.0), rtol=0, atol=1e-3)
+    # The balls of equal mass swap what they have along the line of centres, (4, 3) / 5.
+    assert np.allclose(velocity[3:6, :2], [(7.2, -9.6), (0, 0), (12.8, 9.6)], rtol=0, atol=1e-9)
+    assert overlap_of_any(sim) == 0.0
 
 
 # ---- many at once ------------------------------------------------------------------------------------------------

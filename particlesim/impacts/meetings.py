@@ -6,17 +6,18 @@ import math
 
 import numpy as np
 
-from particlesim.constants import MAX_MANIFOLD, WALL
+from particlesim.constants import MAX_MANIFOLD, SPHERE, WALL
 from particlesim.crew import Crew
 from particlesim.impacts.course import Course, Log, path_of_piece, path_of_state
 from particlesim.impacts.neighbours import Neighbours, around_of, far_apart
 from particlesim.impacts.next_impact import body_of, later, pair_meets, wall_meets
 from particlesim.impacts.sieve import balls, free_way, grown, sieve, sieve_walls
+from particlesim.impacts.time_of_impact import stays_apart
 from particlesim.jit import borrowed, kernel
 from particlesim.narrow_phase.contacts import wall_of_partner
-from particlesim.narrow_phase.pair import nearest_image
+from particlesim.narrow_phase.pair import nearest_image, pair_separation
 from particlesim.state import Constants, ShapeTable, State, World
-from particlesim.vec import along, norm, row, sub
+from particlesim.vec import along, norm, put, row, scaled, sub
 
 # To look into a pair takes as long as other work on so many particles.
 _LOOK = 16
@@ -74,18 +75,56 @@ def _wall_met(table, world, constants, state, course, i, wall, duration, points)
     )
 
 
+@kernel(inline=True)
+def _stay_apart(table, world, constants, state, course, i, j, normals, slot, duration, points):
+    """Whether a normal is soon found that separates particles i and j as long as they go straight on.
+
+    First the one in row ``slot`` of ``normals``, which did so a stretch of time ago, or the line of centres. If it
+    does not, the normal of the nearest points is tried, and kept. Nothing but time depends on it.
+    """
+    body_i, body_j = body_of(constants, i), body_of(constants, j)
+    path_i, path_j = path_of_state(state, course.acceleration, i), path_of_state(state, course.acceleration, j)
+    offset = nearest_image(sub(path_j[0], path_i[0]), world.period)
+    known = float(normals[slot, 0]), float(normals[slot, 1]), float(normals[slot, 2])
+    if known[0] == 0.0 and known[1] == 0.0 and known[2] == 0.0:
+        known = offset
+    length = norm(known)
+    apart = length > 0.0
+    if apart:
+        known = scaled(known, 1.0 / length)
+        apart = stays_apart(table, body_i, path_i, body_j, path_j, offset, known, duration)
+    if not apart:
+        gap, normal = pair_separation(
+            table, body_i[0], body_i[1], path_i[1], body_j[0], body_j[1], path_j[1], offset, points
+        )
+        if gap > 0.0:
+            put(normals, slot, normal)
+            apart = stays_apart(table, body_i, path_i, body_j, path_j, offset, normal, duration)
+    return apart
+
+
 @kernel
-def _look_closer(table, world, constants, state, course, log, pairs, times, duration, first, last):
-    """Fill in the times of pairs ``first .. last`` where they are -1."""
+def _look_closer(table, world, constants, state, course, log, pairs, normals, slots, times, duration, first, last):
+    """Fill in the times of pairs ``first .. last`` where they are -1.
+
+    Pairs whose ``slots`` are not -1 go straight on, and have a row in ``normals`` (see neighbours.py).
+    """
     table, world, constants, state, course, log = borrowed((table, world, constants, state, course, log))
-    pairs, times = borrowed((pairs, times))
+    pairs, normals, slots, times = borrowed((pairs, normals, slots, times))
+    kind, shape = table.kind, constants.shape
     points = np.empty((MAX_MANIFOLD, 3))
     for k in range(first, last):
         if times[k] < 0.0:
             i, j = pairs[k, 0], pairs[k, 1]
             if j < 0:
                 times[k] = _wall_met(table, world, constants, state, course, i, wall_of_partner(j), duration, points)
-            else:
+                continue
+            times[k] = math.inf
+            spheres = kind[shape[i]] == SPHERE and kind[shape[j]] == SPHERE
+            known = not spheres and slots[k] >= 0
+            if not known or not _stay_apart(
+                table, world, constants, state, course, i, j, normals, slots[k], duration, points
+            ):
                 times[k] = _first_meeting(table, world, constants, state, course, log, i, j, duration, points)
 
 
@@ -163,10 +202,13 @@ def follow_paths(where: Where, neighbours: Neighbours, ball: np.ndarray, whom: n
     return all(Crew(len(whom)).each(lambda _, first, last: _follow_paths(*arguments, first, last), len(whom)))
 
 
-def _met(where: Where, pairs: np.ndarray, times: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:
-    """Those of the pairs that meet, and when, with the times of -1 filled in."""
+def _met(
+    where: Where, pairs: np.ndarray, normals: np.ndarray, slots: np.ndarray, times: np.ndarray, duration: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Those of the pairs that meet, and when, with the times of -1 filled in (see ``_look_closer``)."""
+    arguments = pairs, normals, slots, times, duration
     crew = Crew(_LOOK * len(pairs))
-    crew.each(lambda _, first, last: _look_closer(*where, pairs, times, duration, first, last), len(pairs))
+    crew.each(lambda _, first, last: _look_closer(*where, *arguments, first, last), len(pairs))
     meet = times < np.inf
     return pairs[meet], times[meet]
 
@@ -188,8 +230,8 @@ def first_meetings(
     if (world.boundary == WALL).any():
         walls = table.kind, constants.shape, *moving, world.lower, world.upper, world.boundary, duration
         parts += crew.each(lambda _, first, last: sieve_walls(*walls, first, last), count)
-    pairs, times = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    pairs, times = _met(where, pairs, times[:, 0], duration)
+    pairs, slots, times = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    pairs, times = _met(where, pairs, neighbours.normal, slots[:, 0], times[:, 0], duration)
     order = np.argsort(pairs[:, 0] * (count + 6) + pairs[:, 1])
     return pairs[order], times[order]
 
@@ -205,5 +247,6 @@ def missed_meetings(
     arguments = course.island, course.head, first_piece, ball, world.period, neighbours.lists, whom
     parts = Crew(len(whom)).each(lambda _, first, last: _across(*arguments, first, last), len(whom))
     pairs = np.concatenate(parts)
-    met, _ = _met(where, pairs, np.full(len(pairs), -1.0), duration)
+    nowhere = np.full(len(pairs), -1, dtype=np.int64)
+    met, _ = _met(where, pairs, neighbours.normal, nowhere, np.full(len(pairs), -1.0), duration)
     return met

@@ -53,6 +53,7 @@ class Neighbours(NamedTuple):
     lists: Lists
     later_start: np.ndarray  # (n + 1,) int64
     later: np.ndarray  # (m,) int32, the places of later neighbours of place p: later[later_start[p]:later_start[p + 1]]
+    normal: np.ndarray  # (m, 3) float32, what separated these two when that was last looked into; 0 before
 
 
 def places_of(position: np.ndarray, period: np.ndarray) -> Places:
@@ -204,7 +205,8 @@ def find_neighbours(
     other = np.empty(2 * len(later), dtype=np.int32)
     _both_ways(later_start, later, start, other)
     lists = Lists(*places, start[:-1], other)
-    return Neighbours(position.copy(), leash, lists, later_start, later), tested, candidates
+    normal = np.zeros((len(later), 3), dtype=np.float32)
+    return Neighbours(position.copy(), leash, lists, later_start, later, normal), tested, candidates
 
 
 def in_order(neighbours: Neighbours) -> None:

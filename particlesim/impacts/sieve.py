@@ -59,9 +59,10 @@ def balls(radius, position, velocity, acceleration, place, duration, ball, first
 
 
 @kernel(inline=True)
-def _list(found, times, count, i, j, time):
+def _list(found, slots, times, count, i, j, slot, time):
     found[count, 0] = i
     found[count, 1] = j
+    slots[count, 0] = slot
     times[count, 0] = time
     return count + 1
 
@@ -82,17 +83,18 @@ def _pair_time(spheres, ball, p, q, period, duration):
 def sieve(kind, shape, acceleration, alike, ball, particle, later_start, later, period, duration, first, last):
     """Pairs (m, 2), i < j, of places ``first .. last`` with later neighbours that meet, or may, in ``duration`` [s].
 
-    And times (m, 1): when they meet, or -1 where the bounding spheres come together and more must be known. Where not
-    all are known to accelerate ``alike``, it is looked at for each pair.
+    And where they stand in ``later`` (m, 1), and times (m, 1): when they meet, or -1 where the bounding spheres come
+    together and more must be known. Where not all are known to accelerate ``alike``, it is looked at for each pair.
     """
     kind, shape, acceleration, ball, particle = borrowed((kind, shape, acceleration, ball, particle))
     later_start, later, period = borrowed((later_start, later, period))
     around = around_of(period)
-    found, times = np.empty((256, 2), dtype=np.int64), np.empty((256, 1))
+    found, slots = np.empty((256, 2), dtype=np.int64), np.empty((256, 1), dtype=np.int64)
+    times = np.empty((256, 1))
     count = 0
     for p in range(first, last):
         while count + later_start[p + 1] - later_start[p] > len(found):
-            found, times = grown(found), grown(times)
+            found, slots, times = grown(found), grown(slots), grown(times)
         for near in range(later_start[p], later_start[p + 1]):
             q = later[near]
             if far_apart(ball, p, q, around):
@@ -105,23 +107,24 @@ def sieve(kind, shape, acceleration, alike, ball, particle, later_start, later, 
                 spheres = kind[shape[i]] == SPHERE and kind[shape[j]] == SPHERE
                 time = _pair_time(spheres, ball, one, two, period, duration)
             if time < math.inf:
-                count = _list(found, times, count, i, j, time)
-    return found[:count], times[:count]
+                count = _list(found, slots, times, count, i, j, near, time)
+    return found[:count], slots[:count], times[:count]
 
 
 @kernel
 def sieve_walls(
     kind, shape, radius, position, velocity, acceleration, lower, upper, boundary, duration, first, last
 ):  # fmt: skip
-    """As ``sieve``, of particles ``first .. last`` with walls, which are partners below 0."""
+    """As ``sieve``, of particles ``first .. last`` with walls, which are partners below 0 and stand nowhere: -1."""
     kind, shape, radius, position, velocity, acceleration = borrowed(
         (kind, shape, radius, position, velocity, acceleration)
     )
-    found, times = np.empty((256, 2), dtype=np.int64), np.empty((256, 1))
+    found, slots = np.empty((256, 2), dtype=np.int64), np.empty((256, 1), dtype=np.int64)
+    times = np.empty((256, 1))
     count = 0
     for i in range(first, last):
         if count + 6 > len(found):
-            found, times = grown(found), grown(times)
+            found, slots, times = grown(found), grown(slots), grown(times)
         x, v, a = row(position, i), row(velocity, i), row(acceleration, i)
         way = free_way(v, a, duration)
         for wall in range(6):
@@ -135,5 +138,5 @@ def sieve_walls(
                 if time == 0.0 or (kind[shape[i]] != SPHERE and (time < math.inf or room < 0.0)):
                     time = -1.0
                 if time < math.inf:
-                    count = _list(found, times, count, i, wall_as_partner(wall), time)
-    return found[:count], times[:count]
+                    count = _list(found, slots, times, count, i, wall_as_partner(wall), -1, time)
+    return found[:count], slots[:count], times[:count]

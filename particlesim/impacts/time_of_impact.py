@@ -262,6 +262,35 @@ def _longest_proven_step(
 
 
 @kernel
+def stays_apart(table, body_i, path_i, body_j, path_j, offset, normal, duration):
+    """Whether a normal that stands is proven to separate two bodies, now at ``offset``, for ``duration`` [s]."""
+    vertex, vertex_start = table.vertex, table.vertex_start
+    kind_i, kind_j = table.kind[body_i[0]], table.kind[body_j[0]]
+    range_i = vertex_start[body_i[0]], vertex_start[body_i[0] + 1]
+    range_j = vertex_start[body_j[0]], vertex_start[body_j[0] + 1]
+    nothing = (0.0, 0.0, 0.0)
+    reach_i, reach_j = body_i[2], body_j[2]
+    if kind_i != SPHERE:
+        way = scaled(rotate_back(path_i[1], normal), body_i[1])
+        reach_i, _ = _farthest(vertex, range_i[0], range_i[1], way, nothing, 0.0)
+    if kind_j != SPHERE:
+        way = scaled(rotate_back(path_j[1], normal), -body_j[1])
+        reach_j, _ = _farthest(vertex, range_j[0], range_j[1], way, nothing, 0.0)
+    # What nearly touches is left to the search, which knows whether that is an impact.
+    gap = dot(offset, normal) - reach_i - reach_j - 2.0 * IMPACT_TOLERANCE * (body_i[1] + body_j[1])
+    if gap <= 0.0:
+        return False
+    bend = norm(sub(path_j[4], path_i[4])) + _bend(kind_i, body_i, path_i) + _bend(kind_j, body_j, path_j)
+    now_i = body_i[1], path_i[1], spin_of(path_i[1], path_i[3], body_i[3])
+    now_j = body_j[1], path_j[1], spin_of(path_j[1], path_j[3], body_j[3])
+    velocity, speed = sub(path_j[2], path_i[2]), (0.0, 0.0)
+    step = _step_of_turning(
+        vertex, range_i, now_i, range_j, now_j, normal, nothing, gap, offset, velocity, speed, bend, duration
+    )
+    return step >= duration
+
+
+@kernel
 def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wall, start, end, sunk, points):
     """When the separation of two bodies first falls to nothing in ``start .. end`` [s]; inf if it does not.
 

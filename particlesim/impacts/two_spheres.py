@@ -1,8 +1,8 @@
-"""Two spheres that meet each other and nothing else: nine of ten islands in a gas.
+"""Two spheres that meet each other and nothing else: most islands in a gas of spheres.
 
 They need no list of impacts in the order of time, as there is one. What it does to them is worked out here on plain
-numbers, in a fifth of the time that ``response.answer`` takes for contacts of any number and shape, by the same
-formulas in the same order: the result is the same to the last bit.
+numbers, by the formulas of ``response.answer`` in the same order: the result is the same to the last bit. Without it
+all islands of a gas of spheres take two to three times as long.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from particlesim.vec import add, along, cross, dot, norm, put, put4, row, row4, 
 def meet_alone(kind, world, shape, met, first_met, i, j):
     """Whether the members of an island are spheres, without gravity, on whose paths there is one impact."""
     k = first_met[i]
-    only_impact = met[k, 1] == j and (k + 1 == len(met) or met[k + 1, 0] != i) and first_met[j] < 0
+    only_impact = k >= 0 and met[k, 1] == j and (k + 1 == len(met) or met[k + 1, 0] != i) and first_met[j] < 0
     gravity = vector(world.gravity)
     return only_impact and kind[shape[i]] == SPHERE and kind[shape[j]] == SPHERE and dot(gravity, gravity) == 0.0
 
