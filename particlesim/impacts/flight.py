@@ -124,7 +124,7 @@ class Flight:
         with self._spent_on("respond"):
             self._resting.hold(self._neighbours, course.acceleration, duration)
         with self._spent_on("contacts"):
-            met, times = first_meetings(self._where(log), self._neighbours, duration)
+            met, times = first_meetings(self._where(log), self._neighbours, self._resting.standing, duration)
         touched = np.unique(met[met >= 0])
         starts = np.flatnonzero(np.diff(met[:, 0], prepend=-1))
         self._first_met[met[starts, 0]] = starts

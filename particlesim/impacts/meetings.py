@@ -110,16 +110,18 @@ def _met(where: Where, pairs: np.ndarray, times: np.ndarray, duration: float) ->
     return pairs[meet], times[meet]
 
 
-def first_meetings(where: Where, neighbours: Neighbours, duration: float) -> tuple[np.ndarray, np.ndarray]:
+def first_meetings(
+    where: Where, neighbours: Neighbours, standing: np.ndarray, duration: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Who meets whom within ``duration`` [s] if all go on as they are: pairs (m, 2), sorted by the first, times (m,).
 
-    Partners below 0 are walls.
+    Partners below 0 are walls. ``standing`` (n,) says who settles together: they do not meet.
     """
     table, world, constants, state, course, _ = where
     count = len(constants.radius)
     arguments = (
         table.kind, constants.shape, constants.radius, state.position, state.velocity, course.acceleration,
-        world.lower, world.upper, world.boundary, world.period, neighbours.start, neighbours.other, duration,
+        world.lower, world.upper, world.boundary, world.period, neighbours.start, neighbours.other, standing, duration,
     )  # fmt: skip
     with Crew(count) as crew:
         parts = crew.each(lambda _, first, last: sieve(*arguments, first, last), count)

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from particlesim.constants import SPHERE, WALL
+from particlesim.constants import SETTLES, SPHERE, WALL
 from particlesim.impacts.time_of_impact import sphere_meets_wall, spheres_meet
 from particlesim.jit import borrowed, kernel
 from particlesim.narrow_phase.contacts import wall_as_partner
@@ -50,6 +50,7 @@ def sieve(
     period,
     start,
     other,
+    standing,
     duration,
     first,
     last,
@@ -57,12 +58,13 @@ def sieve(
     """Pairs of particles ``first .. last`` with later neighbours and with walls that meet, or may, in ``duration`` [s].
 
     Returns (m, 2) and times (m, 1): when they meet, or -1 where the bounding spheres come together and more must be
-    known.
+    known. What settles together (see cluster.py) is not looked at.
     """
     kind, shape, radius, position, velocity, acceleration = borrowed(
         (kind, shape, radius, position, velocity, acceleration)
     )
     lower, upper, boundary, period, start, other = borrowed((lower, upper, boundary, period, start, other))
+    standing = borrowed(standing)
     found, times = np.empty((256, 2), dtype=np.int64), np.empty((256, 1))
     count = 0
     walls = boundary[0] == WALL or boundary[1] == WALL or boundary[2] == WALL
@@ -71,9 +73,10 @@ def sieve(
             found, times = grown(found), grown(times)
         x, v, a, r = row(position, i), row(velocity, i), row(acceleration, i), radius[i]
         round_i = kind[shape[i]] == SPHERE
+        settles = standing[i] == SETTLES
         for near in range(start[i], start[i + 1]):
             j = other[near]
-            if j < i:
+            if j < i or (settles and standing[j] == SETTLES):
                 continue
             offset = nearest_image(sub(row(position, j), x), period)
             apart = sub(row(velocity, j), v)
@@ -94,7 +97,7 @@ def sieve(
                     time = -1.0
             if time < math.inf:
                 count = _list(found, times, count, i, j, time)
-        if walls:
+        if walls and not settles:
             for wall in range(6):
                 axis = wall // 2
                 if boundary[axis] == WALL:
