@@ -19,16 +19,16 @@ from particlesim.narrow_phase.hull_hull import hull_separation
 from particlesim.narrow_phase.manifold import hull_patch
 from particlesim.narrow_phase.pair import nearest_image, pair_contact
 from particlesim.narrow_phase.walls import wall_normal
-from particlesim.vec import apply, cross, dot, matrix_of, norm, put, row, row4, scaled, sub, vector
+from particlesim.vec import add, along, apply, cross, dot, matrix_of, norm, put, row, row4, scaled, sub, vector
 
 # Columns of a contact point: normal, what a unit impulse does to the two angular momenta and the two spins, effective
 # mass, gap [m], how fast the partners part [m/s], their restitution, the speed below which they come to rest, the
-# smaller inscribed radius, and how far apart the centroids are along the normal.
+# smaller inscribed radius, how far apart the centroids are along the normal, and how far turning may close the gap [m].
 NORMAL, LEVER_I, LEVER_J, TWIST_I, TWIST_J = 0, 3, 6, 9, 12
-MASS, GAP, PARTING, RESTITUTION, SLOW, INRADIUS, APART = 15, 16, 17, 18, 19, 20, 21
-COLUMNS = 22
+MASS, GAP, PARTING, RESTITUTION, SLOW, INRADIUS, APART, BEND = 15, 16, 17, 18, 19, 20, 21, 22
+COLUMNS = 23
 
-# Bodies of a cluster may become this much faster than they came before their pairs are looked at as those of others.
+# Contact points are as far ahead as bodies come that are this much faster than they are thought to be.
 FASTER = 2.0
 
 # Inclined by more than this [sine of the angle], features are no patch, however fast they turn.
@@ -106,14 +106,28 @@ def _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps
 
 
 @kernel
-def _write(constants, state, spin, i, j, normal, offset, arm, m, partner, point):
+def _bend(kind, spin, arm, normal, across):
+    """The most that the gap at a point of a body shrinks by its turning, and by what slides across it [m/s^2].
+
+    The plane of a turning face accelerates towards a point ahead of it by w^2 times its distance from the centroid, and
+    by 2 w times the speed ``across`` at which the point slides along it.
+    """
+    turning = norm(spin) if kind == HULL else 0.0
+    return turning * (turning * abs(dot(arm, normal)) + 2.0 * across)
+
+
+@kernel
+def _write(table, constants, state, spin, i, j, normal, offset, arm, duration, m, partner, point):
     """Write contact point ``m``, but for its gap and what its partners are made of; returns how fast they part."""
+    against = add(row(state.velocity, i), cross(row(spin, i), arm))
     partner[m, 0], partner[m, 1] = i, j
     _put_column(point, m, NORMAL, normal)
     lever = cross(arm, normal)
     twist = spin_of(row4(state.orientation, i), lever, row(constants.inertia, i))
     _put_column(point, m, LEVER_I, lever)
     _put_column(point, m, TWIST_I, twist)
+    _put_column(point, m, LEVER_J, (0.0, 0.0, 0.0))
+    _put_column(point, m, TWIST_J, (0.0, 0.0, 0.0))
     inverse_mass = 1.0 / constants.mass[i] + dot(lever, twist)
     parting = -dot(normal, row(state.velocity, i)) - dot(lever, row(spin, i))
     if j >= 0:
@@ -123,6 +137,13 @@ def _write(constants, state, spin, i, j, normal, offset, arm, m, partner, point)
         _put_column(point, m, TWIST_J, twist)
         inverse_mass += 1.0 / constants.mass[j] + dot(lever, twist)
         parting += dot(normal, row(state.velocity, j)) + dot(lever, row(spin, j))
+        against = sub(against, add(row(state.velocity, j), cross(row(spin, j), sub(arm, offset))))
+    across = norm(along(against, normal, parting))
+    bend = 0.0
+    if j >= 0:
+        bend = _bend(table.kind[constants.shape[i]], row(spin, i), arm, normal, across)
+        bend += _bend(table.kind[constants.shape[j]], row(spin, j), sub(arm, offset), normal, across)
+    point[m, BEND] = 0.5 * bend * duration * duration
     point[m, MASS], point[m, PARTING], point[m, APART] = 1.0 / inverse_mass, parting, dot(offset, normal)
     return parting
 
@@ -155,7 +176,8 @@ def _add_contact(table, world, constants, state, spin, pace, duration, i, j, poi
         normal, offset, count = _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps)
     for k in range(count):
         m = size + k
-        parting = _write(constants, state, spin, i, j, normal, offset, row(points, k), m, partner, point)
+        arm = row(points, k)
+        parting = _write(table, constants, state, spin, i, j, normal, offset, arm, duration, m, partner, point)
         if lossless and abs(parting) > slow:
             return size, LOOSE
         point[m, GAP], point[m, RESTITUTION], point[m, SLOW], point[m, INRADIUS] = gaps[k], restitution, slow, inradius
@@ -180,11 +202,20 @@ def _pressed(world, wall):
 
 
 @kernel
+def surface_paces(constants, state, spin):
+    """How fast the surface of each particle moves at most, (n,) [m/s]."""
+    pace = np.empty(len(constants.radius))
+    for i in range(len(pace)):
+        pace[i] = norm(row(state.velocity, i)) + norm(row(spin, i)) * constants.radius[i]
+    return pace
+
+
+@kernel
 def find_cluster(table, world, constants, state, spin, start, other, duration, pace, standing):
     """Contact points (m, COLUMNS) of all clusters for a stretch of ``duration`` [s], and their partners (m, 2).
 
-    Fills in for each particle its ``pace`` (n,), which bounds the speed of its surface [m/s], and its ``standing``
-    (n,): FREE, SETTLES or LOOSE.
+    ``pace`` (n,) bounds the speeds of surfaces [m/s]. Fills in the ``standing`` (n,) of each particle: FREE, SETTLES
+    or LOOSE.
     """
     table, world, constants, state = borrowed((table, world, constants, state))
     spin, start, other, pace, standing = borrowed((spin, start, other, pace, standing))
@@ -195,9 +226,7 @@ def find_cluster(table, world, constants, state, spin, start, other, duration, p
     waiting = np.empty(count, dtype=np.int64)
     gathered = np.zeros(count, dtype=np.bool_)
     found = size = 0
-    pull = norm(vector(world.gravity)) * duration
     for i in range(count):
-        pace[i] = norm(row(state.velocity, i)) + norm(row(spin, i)) * radius[i] + pull
         standing[i] = FREE
         for wall in range(6):
             if standing[i] != FREE or not _pressed(world, wall):

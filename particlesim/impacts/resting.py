@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from particlesim.constants import FREE, LOOSE, MAX_MANIFOLD, RESTING_DROP, SETTLES
-from particlesim.impacts.cluster import APART, FASTER, find_cluster
+from particlesim.constants import FREE, MAX_MANIFOLD, RESTING_DROP
+from particlesim.impacts.cluster import APART, FASTER, find_cluster, surface_paces
 from particlesim.impacts.neighbours import Neighbours
 from particlesim.impacts.settling import settle
 from particlesim.motion import spins
@@ -18,6 +18,9 @@ from particlesim.state import Constants, ShapeTable, State, World
 
 # While anything rests, a stretch of time is this fraction of what bounces to rest takes.
 _SETTLING_STRETCH = 0.25
+
+# Looks at who may meet whom in a stretch, until no body becomes faster than was thought.
+_MAX_LOOKS = 5
 
 
 class Resting:
@@ -29,12 +32,11 @@ class Resting:
         self._gravity = float(np.linalg.norm(world.gravity))
         self._keys, self._forces = np.empty(0, dtype=np.int64), np.empty(0)
         self._last_bounces = self._time_of_last_bounces()
-        self._pace = np.zeros(count)
         self.standing: np.ndarray = np.full(count, FREE, dtype=np.int64)  # of each particle in its cluster
         self._held = np.empty(0, dtype=np.int64)
         self.wall_impulse: np.ndarray = np.zeros(6)  # of the last stretch [N s]
         self.virial = 0.0  # of the last stretch [J s]
-        self._before: tuple[np.ndarray, np.ndarray] | None = None
+        self._before = np.empty((0, 3)), np.empty((0, 3))
 
     def _time_of_last_bounces(self) -> float:
         """What bounces to rest has done so after this time [s], in which it must be looked at; inf if nothing does."""
@@ -54,41 +56,37 @@ class Resting:
             return
         constants, state = self._constants, self._state
         acceleration[self._held] = self._world.gravity
-        spin = spins(constants, state)
-        partner, point = find_cluster(
-            self._table, self._world, constants, state, spin, neighbours.start, neighbours.other, duration,
-            self._pace, self.standing,
-        )  # fmt: skip
         self._held = np.empty(0, dtype=np.int64)
-        self._before = None
         self.wall_impulse, self.virial = np.zeros(6), 0.0
-        if not len(partner):
-            return
-        keys = self._keys_of(partner)
-        impulse = self._forces_of(keys) * duration
+        spin = spins(constants, state)
+        pace = surface_paces(constants, state, spin) + self._gravity * duration
         before = state.velocity.copy(), state.angular_momentum.copy()
-        pressed = settle(self._world, constants, state, spin, partner, point, duration, impulse, acceleration)
-        self._held = np.flatnonzero(pressed)
-        self._before = before[0][self._held], before[1][self._held]
-        self._keys, self._forces = keys, impulse / duration
-        self._look_out()
+        for _ in range(_MAX_LOOKS):
+            partner, point = find_cluster(
+                self._table, self._world, constants, state, spin, neighbours.start, neighbours.other, duration,
+                pace, self.standing,
+            )  # fmt: skip
+            if not len(partner):
+                return
+            keys = self._keys_of(partner)
+            impulse = self._forces_of(keys) * duration
+            pressed = settle(self._world, constants, state, spin, partner, point, duration, impulse, acceleration)
+            self._held = np.flatnonzero(pressed)
+            self._before = before[0][self._held], before[1][self._held]
+            self._keys, self._forces = keys, impulse / duration
+            reached = surface_paces(constants, state, spins(constants, state))
+            if (reached <= FASTER * pace).all():
+                break
+            np.maximum(pace, reached, out=pace)
+            self.release()
         on_wall = partner[:, 1] < 0
         self.wall_impulse = np.bincount(-1 - partner[on_wall, 1], impulse[on_wall], minlength=6)
         self.virial = float((impulse * point[:, APART])[~on_wall].sum())
 
     def release(self) -> None:
         """Undo what the last ``hold`` did to the state."""
-        if self._before is not None:
+        if len(self._held):
             self._state.velocity[self._held], self._state.angular_momentum[self._held] = self._before
-
-    def _look_out(self) -> None:
-        """Let bodies that have become faster than was reckoned with meet others of their cluster."""
-        held = self._held
-        spin = spins(self._constants, self._state)[held]
-        pace = np.linalg.norm(self._state.velocity[held], axis=1)
-        pace += np.linalg.norm(spin, axis=1) * self._constants.radius[held]
-        fast = held[pace > FASTER * self._pace[held]]
-        self.standing[fast[self.standing[fast] == SETTLES]] = LOOSE
 
     def _keys_of(self, partner: np.ndarray) -> np.ndarray:
         """A number for each contact point that stays the same from stretch to stretch."""

@@ -18,6 +18,7 @@ import math
 import numpy as np
 
 from particlesim.impacts.cluster import (
+    BEND,
     GAP,
     INRADIUS,
     LEVER_I,
@@ -38,54 +39,64 @@ from particlesim.vec import along, dot, put, row, sub, vector
 _MAX_SWEEPS = 100
 
 # Rounds end when no speed at a contact point changes by more than this fraction of what gravity adds in the stretch.
-_CONVERGED = 1e-9
+_CONVERGED = 1e-6
 
 # Contact points that have sunk deeper than this fraction of the inscribed radius are lifted, by a tenth at a time.
 _DEEP = 2e-5
 
 
-@kernel(inline=True)
-def _push(velocity, spin, mass, i, j, point, k, impulse):
-    """Give the impulse of a contact point to the velocities and spins of its two partners."""
-    normal = column(point, k, NORMAL)
-    put(velocity, i, along(row(velocity, i), normal, -impulse / mass[i]))
-    put(spin, i, along(row(spin, i), column(point, k, TWIST_I), -impulse))
-    if j >= 0:
-        put(velocity, j, along(row(velocity, j), normal, impulse / mass[j]))
-        put(spin, j, along(row(spin, j), column(point, k, TWIST_J), impulse))
+@kernel
+def _rows_of(partner, k, world):
+    """The rows of the two partners of a contact point in an array of motions, whose row ``world`` is the walls'."""
+    return partner[k, 0], partner[k, 1] if partner[k, 1] >= 0 else world
 
 
-@kernel(inline=True)
-def _parting(velocity, spin, i, j, point, k):
-    """Speed at which the partners part at a contact point."""
-    normal = column(point, k, NORMAL)
-    parting = -dot(normal, row(velocity, i)) - dot(column(point, k, LEVER_I), row(spin, i))
-    if j >= 0:
-        parting += dot(normal, row(velocity, j)) + dot(column(point, k, LEVER_J), row(spin, j))
+@kernel
+def _push(motion, lightness, point, i, j, k, impulse):
+    """Give the impulse of a contact point to the motions in rows ``i`` and ``j``."""
+    of_i, of_j = impulse * lightness[i], impulse * lightness[j]
+    for axis in range(3):
+        normal = point[k, NORMAL + axis]
+        motion[i, axis] -= of_i * normal
+        motion[j, axis] += of_j * normal
+        motion[i, 3 + axis] -= impulse * point[k, TWIST_I + axis]
+        motion[j, 3 + axis] += impulse * point[k, TWIST_J + axis]
+
+
+@kernel
+def _parting(motion, point, i, j, k):
+    """Speed at which the motions in rows ``i`` and ``j`` part at a contact point."""
+    parting = 0.0
+    for axis in range(3):
+        parting += point[k, NORMAL + axis] * (motion[j, axis] - motion[i, axis])
+        parting += point[k, LEVER_J + axis] * motion[j, 3 + axis] - point[k, LEVER_I + axis] * motion[i, 3 + axis]
     return parting
 
 
 @kernel
-def _press(partner, point, mass, wanted, small, velocity, spin, impulse):
-    """Change ``impulse`` (m,), velocities and spins until partners part at each point at the speed ``wanted`` at least.
+def _press(partner, point, lightness, wanted, small, motion, impulse):
+    """Change ``impulse`` (m,) and ``motion`` until partners part at each point at the speed ``wanted`` at least.
 
+    ``motion`` (n + 1, 6) are velocities and spins, with a row for the walls; ``lightness`` (n + 1,) is 1 / mass.
     Ends when no such speed changes by more than ``small`` [m/s], or after _MAX_SWEEPS rounds. Up and down by turns:
-    what bears on a heap from above is soon known at its foot.
+    what bears on a heap from above is soon known at its foot. Returns the last change [m/s].
     """
-    count = len(impulse)
+    count, walls = len(impulse), len(motion) - 1
+    change = 0.0
     for sweep in range(_MAX_SWEEPS):
         change = 0.0
         for step in range(count):
             k = step if sweep % 2 == 0 else count - 1 - step
-            i, j = partner[k, 0], partner[k, 1]
-            lack = wanted[k] - _parting(velocity, spin, i, j, point, k)
+            i, j = _rows_of(partner, k, walls)
+            lack = wanted[k] - _parting(motion, point, i, j, k)
             more = max(-impulse[k], lack * point[k, MASS])
             if more != 0.0:
-                _push(velocity, spin, mass, i, j, point, k, more)
+                _push(motion, lightness, point, i, j, k, more)
                 impulse[k] += more
-                change = max(change, abs(more) / point[k, MASS])
+                change = max(change, abs(lack))
         if change <= small:
             break
+    return change
 
 
 @kernel
@@ -108,35 +119,48 @@ def _raise(point, impulse, duration, wanted):
         if impulse[k] > 0.0 and point[k, PARTING] < -point[k, SLOW] and point[k, RESTITUTION] > 0.0:
             wanted[k] = -point[k, RESTITUTION] * point[k, PARTING]
             anything = True
-        elif point[k, GAP] < -_DEEP * point[k, INRADIUS]:
-            wanted[k] = min(-0.1 * point[k, GAP] / duration, point[k, SLOW])
+        elif point[k, GAP] - point[k, BEND] < -_DEEP * point[k, INRADIUS]:
+            lift = point[k, BEND] - (point[k, GAP] if point[k, GAP] > 0.0 else 0.1 * point[k, GAP])
+            wanted[k] = min(lift / duration, point[k, SLOW])
             anything = True
     return anything
 
 
 @kernel
+def _velocity_in(motion, i):
+    """Velocity of body ``i``."""
+    return motion[i, 0], motion[i, 1], motion[i, 2]
+
+
+@kernel
+def _spin_in(motion, i):
+    """Angular velocity of body ``i``."""
+    return motion[i, 3], motion[i, 4], motion[i, 5]
+
+
+@kernel
 def _gain(mass, fall, pressed, old, new):
-    """Energy that bodies gain by going from the motion ``old`` to ``new``: (velocity, spin, angular momentum) (n, 3).
+    """Energy that bodies gain by going from ``old`` to ``new``: each the motion and the angular momentum (n, 3).
 
     ``fall`` is gravity times the duration [m/s].
     """
     gain = 0.0
     for i in range(len(mass)):
         if pressed[i]:
-            v, w = row(old[0], i), row(new[0], i)
+            v, w = _velocity_in(old[0], i), _velocity_in(new[0], i)
             gain += mass[i] * (0.5 * dot(w, w) - 0.5 * dot(v, v) - dot(fall, w))
-            gain += 0.5 * (dot(row(new[1], i), row(new[2], i)) - dot(row(old[1], i), row(old[2], i)))
+            gain += 0.5 * (dot(_spin_in(new[0], i), row(new[1], i)) - dot(_spin_in(old[0], i), row(old[1], i)))
     return gain
 
 
 @kernel
 def _difference(mass, pressed, one, two):
-    """Kinetic energy of the difference between two motions (velocity, spin, angular momentum)."""
+    """Kinetic energy of the difference between two motions, each with the angular momentum."""
     energy = 0.0
     for i in range(len(mass)):
         if pressed[i]:
-            v = sub(row(two[0], i), row(one[0], i))
-            spin, turn = sub(row(two[1], i), row(one[1], i)), sub(row(two[2], i), row(one[2], i))
+            v = sub(_velocity_in(two[0], i), _velocity_in(one[0], i))
+            spin, turn = sub(_spin_in(two[0], i), _spin_in(one[0], i)), sub(row(two[1], i), row(one[1], i))
             energy += 0.5 * (mass[i] * dot(v, v) + dot(spin, turn))
     return energy
 
@@ -179,35 +203,42 @@ def settle(world, constants, state, spin, partner, point, duration, impulse, acc
     g = vector(world.gravity)
     fall = g[0] * duration, g[1] * duration, g[2] * duration
     small = _CONVERGED * math.sqrt(dot(fall, fall))
-    velocity, turning = state.velocity.copy(), spin.copy()
-    for i in range(len(mass)):
-        put(velocity, i, along(row(velocity, i), fall, 1.0))
+    count = len(mass)
+    start, lightness = np.zeros((count + 1, 6)), np.zeros(count + 1)
+    for i in range(count):
+        lightness[i] = 1.0 / mass[i]
+        for axis in range(3):
+            start[i, axis], start[i, 3 + axis] = state.velocity[i, axis], spin[i, axis]
+    motion = start.copy()
+    for i in range(count):
+        for axis in range(3):
+            motion[i, axis] += fall[axis]
     wanted = np.empty(len(impulse))
     for k in range(len(impulse)):
-        wanted[k] = -max(point[k, GAP], 0.0) / duration
-        _push(velocity, turning, mass, partner[k, 0], partner[k, 1], point, k, impulse[k])
-    _press(partner, point, mass, wanted, small, velocity, turning, impulse)
-    pressed = np.zeros(len(mass), dtype=np.bool_)
+        wanted[k] = -max(point[k, GAP] - point[k, BEND], 0.0) / duration
+        a, b = _rows_of(partner, k, count)
+        _push(motion, lightness, point, a, b, k, impulse[k])
+    _press(partner, point, lightness, wanted, small, motion, impulse)
+    pressed = np.zeros(count, dtype=np.bool_)
     _mark(partner, impulse, pressed)
     momentum = _turned(partner, point, impulse, state.angular_momentum)
     if _raise(point, impulse, duration, wanted):
-        low, before = (velocity.copy(), turning.copy(), momentum), impulse.copy()
-        _press(partner, point, mass, wanted, small, velocity, turning, impulse)
+        low, before = (motion.copy(), momentum), impulse.copy()
+        _press(partner, point, lightness, wanted, small, motion, impulse)
         _mark(partner, impulse, pressed)
-        start = state.velocity, spin, state.angular_momentum
-        high = velocity, turning, _turned(partner, point, impulse, state.angular_momentum)
-        share = _affordable(mass, fall, pressed, start, low, high)
-        for i in range(len(mass)):
-            put(velocity, i, along(row(low[0], i), sub(row(high[0], i), row(low[0], i)), share))
+        high = motion, _turned(partner, point, impulse, state.angular_momentum)
+        share = _affordable(mass, fall, pressed, (start, state.angular_momentum), low, high)
+        for i in range(count):
+            for k in range(6):
+                motion[i, k] = low[0][i, k] + share * (motion[i, k] - low[0][i, k])
+            pressed[i] = False
         for k in range(len(impulse)):
             impulse[k] = before[k] + share * (impulse[k] - before[k])
         momentum = _turned(partner, point, impulse, state.angular_momentum)
-        for i in range(len(mass)):
-            pressed[i] = False
         _mark(partner, impulse, pressed)
     for i in range(len(mass)):
         if pressed[i]:
-            put(state.velocity, i, row(velocity, i))
+            put(state.velocity, i, _velocity_in(motion, i))
             put(state.angular_momentum, i, row(momentum, i))
             put(acceleration, i, (0.0, 0.0, 0.0))
     return pressed

@@ -41,13 +41,18 @@ def facing_feature(table, shape, size, matrix, offset, direction, tilt, feature)
     # Taken out of their struct once: each access counts references, which costs more than the arithmetic.
     face_normal, loop, loop_start = table.face_normal, table.loop, table.loop_start
     vertices = table.vertex[table.vertex_start[shape] : table.vertex_start[shape + 1]]
+    face, least = -1, tilt
     for f in range(table.face_start[shape], table.face_start[shape + 1]):
         n = row(face_normal, f)
-        if dot(n, local) > 0.0 and norm(cross(n, local)) < tilt:
-            first, last = loop_start[f], loop_start[f + 1]
-            for k in range(first, last):
-                put(feature, k - first, add(offset, apply(matrix, scaled(row(vertices, loop[k]), size))))
-            return last - first, True
+        if dot(n, local) > 0.0:
+            slope = norm(cross(n, local))
+            if slope < least:
+                face, least = f, slope
+    if face >= 0:
+        first, last = loop_start[face], loop_start[face + 1]
+        for k in range(first, last):
+            put(feature, k - first, add(offset, apply(matrix, scaled(row(vertices, loop[k]), size))))
+        return last - first, True
     best, reach = 0, -math.inf
     for v in range(len(vertices)):
         r = dot(row(vertices, v), local)
@@ -114,6 +119,14 @@ def _shared_by_edges(edge_a, edge_b, points):
 
 
 @kernel
+def _way_to_face(face, corners, direction, point):
+    """How far it is from a point along ``direction`` to the plane of a face, which must not be parallel to it."""
+    start = row(face, 0)
+    n = cross(sub(row(face, corners // 3), start), sub(row(face, 2 * corners // 3), start))
+    return dot(n, sub(start, point)) / dot(n, direction)
+
+
+@kernel
 def hull_patch(
     table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset, normal, separation, middle, tilt, points, gaps
 ):
@@ -151,7 +164,7 @@ def hull_patch(
         put(points, k, along(corner, normal, shift))
         gaps[k] = separation
         if face_a and count_b > 1:
-            gaps[k] = dot(normal, sub(corner, row(of_a, 0)))
+            gaps[k] = -_way_to_face(of_a, count_a, normal, corner)
         elif face_b and count_a > 1:
-            gaps[k] = dot(normal, sub(row(of_b, 0), corner))
+            gaps[k] = _way_to_face(of_b, count_b, normal, corner)
     return kept
