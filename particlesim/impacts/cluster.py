@@ -19,7 +19,24 @@ from particlesim.narrow_phase.hull_hull import hull_separation
 from particlesim.narrow_phase.manifold import hull_patch
 from particlesim.narrow_phase.pair import nearest_image, pair_contact
 from particlesim.narrow_phase.walls import wall_normal
-from particlesim.vec import add, along, apply, cross, dot, matrix_of, norm, put, row, row4, scaled, sub, vector
+from particlesim.vec import (
+    add,
+    along,
+    apply,
+    conjugate,
+    cross,
+    dot,
+    matrix_of,
+    norm,
+    put,
+    put4,
+    quaternion_product,
+    row,
+    row4,
+    scaled,
+    sub,
+    vector,
+)
 
 # Columns of a contact point: normal, what a unit impulse does to the two angular momenta and the two spins, effective
 # mass, gap [m], how fast the partners part [m/s], their restitution, the speed below which they come to rest, the
@@ -83,12 +100,12 @@ def _wall_points(table, world, constants, state, i, wall, reach, points, gaps):
 
 @kernel
 def _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps):
-    """Contact points of two particles within ``reach``, and the gaps there: (normal, offset, how many)."""
+    """Contact points of two particles within ``reach``, and the gaps there: (normal, offset, how many, least gap)."""
     offset = nearest_image(sub(row(state.position, j), row(state.position, i)), world.period)
-    far = constants.radius[i] + constants.radius[j] + reach
+    gap = norm(offset) - constants.radius[i] - constants.radius[j]
     normal, count = (0.0, 0.0, 0.0), 0
-    if dot(offset, offset) > far * far:
-        return normal, offset, count
+    if gap > reach:
+        return normal, offset, count, gap
     shape_i, size_i, turn_i = constants.shape[i], constants.size[i], row4(state.orientation, i)
     shape_j, size_j, turn_j = constants.shape[j], constants.size[j], row4(state.orientation, j)
     if table.kind[shape_i] == HULL and table.kind[shape_j] == HULL:
@@ -102,7 +119,7 @@ def _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps
     else:
         gap, normal, count = pair_contact(table, shape_i, size_i, turn_i, shape_j, size_j, turn_j, offset, points)
         gaps[0] = gap
-    return normal, offset, count if gap <= reach else 0
+    return normal, offset, count if gap <= reach else 0, gap
 
 
 @kernel
@@ -149,11 +166,12 @@ def _write(table, constants, state, spin, i, j, normal, offset, arm, duration, m
 
 
 @kernel
-def _add_contact(table, world, constants, state, spin, pace, duration, i, j, points, gaps, partner, point, size):
-    """Add the points of particle i and partner j that may close; returns how many there are then, and what they are.
+def _add_contact(table, world, constants, state, spin, pace, duration, i, j, clear, points, gaps, partner, point, size):
+    """Add the points of particle i and partner j that may close.
 
-    That is FREE if they cannot meet, SETTLES if they may, LOOSE if they may but must meet as others do: what rebounds
-    in full settles only where it is quite still. ``points`` and ``gaps`` are room to work in; ``partner`` and
+    Returns how many there are then, what they are and how far apart the partners are at least, which is ``clear`` or
+    more. They are FREE if they cannot meet, SETTLES if they may, LOOSE if they may but must meet as others do: what
+    rebounds in full settles only where it is quite still. ``points`` and ``gaps`` are room to work in; ``partner`` and
     ``point`` must have room for MAX_MANIFOLD more.
     """
     restitution, slow = restitution_of(world, constants, i, j)
@@ -170,19 +188,21 @@ def _add_contact(table, world, constants, state, spin, pace, duration, i, j, poi
     reach = RESTING_DROP * inradius + FASTER * speed * duration
     if lossless:
         slow, reach = STILL * slow, STILL * RESTING_DROP * inradius
+    what = LOOSE if lossless else SETTLES
+    if clear > reach:
+        return size, LOOSE if lossless else FREE, clear
     if j < 0:
         normal, offset, count = _wall_points(table, world, constants, state, i, wall_of_partner(j), reach, points, gaps)
     else:
-        normal, offset, count = _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps)
+        normal, offset, count, clear = _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps)
     for k in range(count):
         m = size + k
         arm = row(points, k)
         parting = _write(table, constants, state, spin, i, j, normal, offset, arm, duration, m, partner, point)
         if lossless and abs(parting) > slow:
-            return size, LOOSE
+            return size, LOOSE, clear
         point[m, GAP], point[m, RESTITUTION], point[m, SLOW], point[m, INRADIUS] = gaps[k], restitution, slow, inradius
-    what = LOOSE if lossless else (SETTLES if count > 0 else FREE)
-    return size + count, what
+    return size + count, what if lossless or count > 0 else FREE, clear
 
 
 @kernel
@@ -211,14 +231,32 @@ def surface_paces(constants, state, spin):
 
 
 @kernel
-def find_cluster(table, world, constants, state, spin, start, other, duration, pace, standing):
+def walk(constants, state, period, position, orientation, way):
+    """Add to ``way`` (n,) how far surfaces are from where they were at ``position`` and ``orientation`` [m].
+
+    These become the present ones.
+    """
+    constants, state, period = borrowed((constants, state, period))
+    for i in range(len(way)):
+        x, q = row(state.position, i), row4(state.orientation, i)
+        half = quaternion_product(q, conjugate(row4(orientation, i)))
+        turn = 2.0 * constants.radius[i] * norm((half[1], half[2], half[3]))
+        way[i] += norm(nearest_image(sub(x, row(position, i)), period)) + turn
+        put(position, i, x)
+        put4(orientation, i, q)
+
+
+@kernel
+def find_cluster(table, world, constants, state, spin, start, other, duration, pace, way, clearance, standing):
     """Contact points (m, COLUMNS) of all clusters for a stretch of ``duration`` [s], and their partners (m, 2).
 
-    ``pace`` (n,) bounds the speeds of surfaces [m/s]. Fills in the ``standing`` (n,) of each particle: FREE, SETTLES
-    or LOOSE.
+    ``pace`` (n,) bounds the speeds of surfaces [m/s], ``way`` (n,) how far they have come [m]. ``clearance`` (m,)
+    beside ``other`` is how far apart neighbours were at least, with the ways they had come then, and is kept up to
+    date. Fills in the ``standing`` (n,) of each particle: FREE, SETTLES or LOOSE.
     """
     table, world, constants, state = borrowed((table, world, constants, state))
     spin, start, other, pace, standing = borrowed((spin, start, other, pace, standing))
+    way, clearance = borrowed((way, clearance))
     position, radius = state.position, constants.radius
     count = len(radius)
     points, gaps = np.empty((MAX_MANIFOLD, 3)), np.empty(MAX_MANIFOLD)
@@ -235,8 +273,8 @@ def find_cluster(table, world, constants, state, spin, start, other, duration, p
             room = world.upper[axis] - position[i, axis] if wall % 2 else position[i, axis] - world.lower[axis]
             if room <= radius[i] * (1.0 + RESTING_DROP):
                 j = wall_as_partner(wall)
-                last, _ = _add_contact(
-                    table, world, constants, state, spin, pace, duration, i, j, points, gaps, partner, point, 0
+                last, _, _ = _add_contact(
+                    table, world, constants, state, spin, pace, duration, i, j, -np.inf, points, gaps, partner, point, 0
                 )
                 if _rests(point, 0, last):
                     standing[i] = SETTLES
@@ -252,9 +290,10 @@ def find_cluster(table, world, constants, state, spin, start, other, duration, p
         for wall in range(6):
             if world.boundary[wall // 2] == WALL:
                 j = wall_as_partner(wall)
-                size, what = _add_contact(
-                    table, world, constants, state, spin, pace, duration, i, j, points, gaps, partner, point, size
-                )
+                size, what, _ = _add_contact(
+                    table, world, constants, state, spin, pace, duration, i, j, -np.inf, points, gaps, partner, point,
+                    size,
+                )  # fmt: skip
                 if what == LOOSE:
                     standing[i] = LOOSE
         for near in range(start[i], start[i + 1]):
@@ -263,9 +302,12 @@ def find_cluster(table, world, constants, state, spin, start, other, duration, p
                 continue
             a, b = min(i, j), max(i, j)
             before = size
-            size, what = _add_contact(
-                table, world, constants, state, spin, pace, duration, a, b, points, gaps, partner, point, size
-            )
+            come = way[i] + way[j]
+            size, what, clear = _add_contact(
+                table, world, constants, state, spin, pace, duration, a, b, clearance[near] - come, points, gaps,
+                partner, point, size,
+            )  # fmt: skip
+            clearance[near] = clear + come
             if size > before and standing[j] == FREE:
                 standing[j] = SETTLES
                 waiting[found] = j

@@ -195,7 +195,7 @@ class Flight:
         self.counts.impacts += int(total[IMPACTS])
         self.counts.virial += float(total[VIRIAL]) + self._resting.virial
         self.counts.wall_impulse += total[WALLS:] + self._resting.wall_impulse
-        self.counts.unresolved += unfinished > 0
+        self.counts.unresolved += unfinished > 0 or self._resting.unresolved
 
     def _fly_on(self, duration: float) -> None:
         """Bring everyone to the end of the stretch."""

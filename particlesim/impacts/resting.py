@@ -10,14 +10,19 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.constants import FREE, MAX_MANIFOLD, RESTING_DROP
-from particlesim.impacts.cluster import APART, FASTER, find_cluster, surface_paces
+from particlesim.impacts.cluster import APART, FASTER, find_cluster, surface_paces, walk
 from particlesim.impacts.neighbours import Neighbours
 from particlesim.impacts.settling import settle
 from particlesim.motion import spins
 from particlesim.state import Constants, ShapeTable, State, World
 
-# While anything rests, a stretch of time is this fraction of what bounces to rest takes.
-_SETTLING_STRETCH = 0.25
+# While anything rests, surfaces of what is pressed move by this fraction of the inscribed radius in a stretch of time:
+# ways bend by the square of it. No stretch is shorter for it than this fraction of what it is where all lie still.
+_WAY_PER_STRETCH = 0.01
+_SHORTEST_STRETCH = 0.25
+
+# What lies still is thought to become this much faster by others than by gravity in a stretch.
+_HASTE = 4.0
 
 # Looks at who may meet whom in a stretch, until no body becomes faster than was thought.
 _MAX_LOOKS = 5
@@ -31,11 +36,18 @@ class Resting:
         self._table, self._world, self._constants, self._state = table, world, constants, state
         self._gravity = float(np.linalg.norm(world.gravity))
         self._keys, self._forces = np.empty(0, dtype=np.int64), np.empty(0)
+        self._inradius = float(constants.inradius.mean()) if count else 0.0
+        self._fastest = 0.0  # of the surfaces of what is pressed [m/s]
         self._last_bounces = self._time_of_last_bounces()
         self.standing: np.ndarray = np.full(count, FREE, dtype=np.int64)  # of each particle in its cluster
         self._held = np.empty(0, dtype=np.int64)
+        self._seen = state.position.copy(), state.orientation.copy()
+        self._way = np.zeros(count)
+        self._neighbours: Neighbours | None = None
+        self._clearance = np.empty(0)
         self.wall_impulse: np.ndarray = np.zeros(6)  # of the last stretch [N s]
         self.virial = 0.0  # of the last stretch [J s]
+        self.unresolved = False  # whether the bound on the work of the last stretch was reached
         self._before = np.empty((0, 3)), np.empty((0, 3))
 
     def _time_of_last_bounces(self) -> float:
@@ -43,12 +55,15 @@ class Resting:
         restitution = np.append(self._constants.restitution, self._world.restitution)
         if self._gravity == 0.0 or restitution.min() == 1.0 or not len(self._constants.mass):
             return np.inf
-        return 0.5 * float(np.sqrt(2.0 * RESTING_DROP * self._constants.inradius.mean() / self._gravity))
+        return 0.5 * float(np.sqrt(2.0 * RESTING_DROP * self._inradius / self._gravity))
 
     @property
     def longest_stretch(self) -> float:
         """How long a stretch of time may be [s]: not so long that what came to rest were not looked at."""
-        return self._last_bounces * (_SETTLING_STRETCH if len(self._held) else 1.0)
+        if not len(self._held):
+            return self._last_bounces
+        in_time = _WAY_PER_STRETCH * self._inradius / max(self._fastest, 1e-300)
+        return min(max(in_time, _SHORTEST_STRETCH * self._last_bounces), self._last_bounces)
 
     def hold(self, neighbours: Neighbours, acceleration: np.ndarray, duration: float) -> None:
         """Hold what rests for a stretch of ``duration`` [s]: its velocity changes and its acceleration (n, 3) is 0."""
@@ -57,31 +72,43 @@ class Resting:
         constants, state = self._constants, self._state
         acceleration[self._held] = self._world.gravity
         self._held = np.empty(0, dtype=np.int64)
-        self.wall_impulse, self.virial = np.zeros(6), 0.0
+        self.wall_impulse, self.virial, self.unresolved = np.zeros(6), 0.0, False
+        self._keep_clearance(neighbours)
         spin = spins(constants, state)
-        pace = surface_paces(constants, state, spin) + self._gravity * duration
+        pace = surface_paces(constants, state, spin) + _HASTE * self._gravity * duration
         before = state.velocity.copy(), state.angular_momentum.copy()
-        for _ in range(_MAX_LOOKS):
+        for look in range(1, _MAX_LOOKS + 1):
             partner, point = find_cluster(
                 self._table, self._world, constants, state, spin, neighbours.start, neighbours.other, duration,
-                pace, self.standing,
+                pace, self._way, self._clearance, self.standing,
             )  # fmt: skip
             if not len(partner):
                 return
             keys = self._keys_of(partner)
             impulse = self._forces_of(keys) * duration
-            pressed = settle(self._world, constants, state, spin, partner, point, duration, impulse, acceleration)
+            pressed, done = settle(self._world, constants, state, spin, partner, point, duration, impulse, acceleration)
             self._held = np.flatnonzero(pressed)
             self._before = before[0][self._held], before[1][self._held]
             self._keys, self._forces = keys, impulse / duration
             reached = surface_paces(constants, state, spins(constants, state))
-            if (reached <= FASTER * pace).all():
+            self._fastest = float(reached[self._held].max(initial=0.0))
+            foreseen = bool((reached <= FASTER * pace).all())
+            self.unresolved = not (done and foreseen)
+            if foreseen or look == _MAX_LOOKS:
                 break
-            np.maximum(pace, reached, out=pace)
+            np.maximum(pace, FASTER * reached, out=pace)
             self.release()
+            acceleration[self._held] = self._world.gravity
         on_wall = partner[:, 1] < 0
         self.wall_impulse = np.bincount(-1 - partner[on_wall, 1], impulse[on_wall], minlength=6)
         self.virial = float((impulse * point[:, APART])[~on_wall].sum())
+
+    def _keep_clearance(self, neighbours: Neighbours) -> None:
+        """Bring up to date how far surfaces have come; of new neighbours nothing is known yet."""
+        walk(self._constants, self._state, self._world.period, *self._seen, self._way)
+        if neighbours is not self._neighbours:
+            self._neighbours = neighbours
+            self._clearance = np.full(len(neighbours.other), -np.inf)
 
     def release(self) -> None:
         """Undo what the last ``hold`` did to the state."""

@@ -38,6 +38,10 @@ from particlesim.vec import along, dot, put, row, sub, vector
 # Rounds over all contact points. Piles that lie still need one or two, as they start from the forces of before.
 _MAX_SWEEPS = 100
 
+# Rounds while some gap may still close by more than this fraction of the inscribed radius too much.
+_MAX_URGENT_SWEEPS = 1000
+_URGENT = 1e-6
+
 # Rounds end when no speed at a contact point changes by more than this fraction of what gravity adds in the stretch.
 _CONVERGED = 1e-6
 
@@ -74,17 +78,17 @@ def _parting(motion, point, i, j, k):
 
 
 @kernel
-def _press(partner, point, lightness, wanted, small, motion, impulse):
+def _press(partner, point, lightness, wanted, small, duration, motion, impulse):
     """Change ``impulse`` (m,) and ``motion`` until partners part at each point at the speed ``wanted`` at least.
 
     ``motion`` (n + 1, 6) are velocities and spins, with a row for the walls; ``lightness`` (n + 1,) is 1 / mass.
-    Ends when no such speed changes by more than ``small`` [m/s], or after _MAX_SWEEPS rounds. Up and down by turns:
-    what bears on a heap from above is soon known at its foot. Returns the last change [m/s].
+    Ends when no such speed changes by more than ``small`` [m/s], or after _MAX_SWEEPS rounds, _MAX_URGENT_SWEEPS if it
+    matters. Up and down by turns:
+    what bears on a heap from above is soon known at its foot. Returns whether it is done.
     """
     count, walls = len(impulse), len(motion) - 1
-    change = 0.0
-    for sweep in range(_MAX_SWEEPS):
-        change = 0.0
+    for sweep in range(_MAX_URGENT_SWEEPS):
+        change = sinking = 0.0
         for step in range(count):
             k = step if sweep % 2 == 0 else count - 1 - step
             i, j = _rows_of(partner, k, walls)
@@ -94,9 +98,10 @@ def _press(partner, point, lightness, wanted, small, motion, impulse):
                 _push(motion, lightness, point, i, j, k, more)
                 impulse[k] += more
                 change = max(change, abs(lack))
-        if change <= small:
-            break
-    return change
+                sinking = max(sinking, abs(lack) * duration / point[k, INRADIUS])
+        if change <= small or (sweep >= _MAX_SWEEPS and sinking <= _URGENT):
+            return True
+    return False
 
 
 @kernel
@@ -196,7 +201,8 @@ def settle(world, constants, state, spin, partner, point, duration, impulse, acc
     """Give pressed bodies the velocity and angular momentum with which they go on steadily for ``duration`` [s].
 
     ``impulse`` (m,) holds a guess of the impulses at the contact points, and is what they are in the end. ``spin``
-    (n, 3) are the angular velocities now. Pressed bodies have an ``acceleration`` (n, 3) of 0. Returns which they are.
+    (n, 3) are the angular velocities now. Pressed bodies have an ``acceleration`` (n, 3) of 0. Returns which they are,
+    and whether the impulses are good enough.
     """
     world, constants, state = borrowed((world, constants, state))
     mass = constants.mass
@@ -218,13 +224,13 @@ def settle(world, constants, state, spin, partner, point, duration, impulse, acc
         wanted[k] = -max(point[k, GAP] - point[k, BEND], 0.0) / duration
         a, b = _rows_of(partner, k, count)
         _push(motion, lightness, point, a, b, k, impulse[k])
-    _press(partner, point, lightness, wanted, small, motion, impulse)
+    done = _press(partner, point, lightness, wanted, small, duration, motion, impulse)
     pressed = np.zeros(count, dtype=np.bool_)
     _mark(partner, impulse, pressed)
     momentum = _turned(partner, point, impulse, state.angular_momentum)
     if _raise(point, impulse, duration, wanted):
         low, before = (motion.copy(), momentum), impulse.copy()
-        _press(partner, point, lightness, wanted, small, motion, impulse)
+        done = _press(partner, point, lightness, wanted, small, duration, motion, impulse) and done
         _mark(partner, impulse, pressed)
         high = motion, _turned(partner, point, impulse, state.angular_momentum)
         share = _affordable(mass, fall, pressed, (start, state.angular_momentum), low, high)
@@ -241,4 +247,4 @@ def settle(world, constants, state, spin, partner, point, duration, impulse, acc
             put(state.velocity, i, _velocity_in(motion, i))
             put(state.angular_momentum, i, row(momentum, i))
             put(acceleration, i, (0.0, 0.0, 0.0))
-    return pressed
+    return pressed, done
