@@ -51,6 +51,9 @@ FASTER = 2.0
 # Inclined by more than this [sine of the angle], features are no patch, however fast they turn.
 _MOST_TILT = 0.2
 
+# Faces and edges reach this fraction of the inscribed radius over their ends at the most, for what may slide there.
+_BORDER = 0.02
+
 
 @kernel
 def column(array, k, first):
@@ -110,11 +113,12 @@ def _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps
     shape_j, size_j, turn_j = constants.shape[j], constants.size[j], row4(state.orientation, j)
     if table.kind[shape_i] == HULL and table.kind[shape_j] == HULL:
         matrix_i, matrix_j = matrix_of(turn_i), matrix_of(turn_j)
+        border = _BORDER * min(constants.inradius[i], constants.inradius[j])
         gap, normal, middle = hull_separation(table, shape_i, size_i, matrix_i, shape_j, size_j, matrix_j, offset)
         if gap <= reach:
             count = hull_patch(
                 table, shape_i, size_i, matrix_i, shape_j, size_j, matrix_j,
-                offset, normal, gap, middle, tilt, points, gaps,
+                offset, normal, gap, middle, tilt, min(reach, border), points, gaps,
             )  # fmt: skip
     else:
         gap, normal, count = pair_contact(table, shape_i, size_i, turn_i, shape_j, size_j, turn_j, offset, points)

@@ -43,7 +43,7 @@ _MAX_URGENT_SWEEPS = 1000
 _URGENT = 1e-6
 
 # Rounds end when no speed at a contact point changes by more than this fraction of what gravity adds in the stretch.
-_CONVERGED = 1e-6
+_CONVERGED = 1e-9
 
 # Contact points that have sunk deeper than this fraction of the inscribed radius are lifted, by a tenth at a time.
 _DEEP = 2e-5
@@ -121,12 +121,15 @@ def _raise(point, impulse, duration, wanted):
     """Add what restitution and depth want of the speeds at contact points; returns whether that is anything."""
     anything = False
     for k in range(len(impulse)):
-        if impulse[k] > 0.0 and point[k, PARTING] < -point[k, SLOW] and point[k, RESTITUTION] > 0.0:
-            wanted[k] = -point[k, RESTITUTION] * point[k, PARTING]
-            anything = True
-        elif point[k, GAP] - point[k, BEND] < -_DEEP * point[k, INRADIUS]:
-            lift = point[k, BEND] - (point[k, GAP] if point[k, GAP] > 0.0 else 0.1 * point[k, GAP])
-            wanted[k] = min(lift / duration, point[k, SLOW])
+        back = 0.0
+        if impulse[k] > 0.0 and point[k, PARTING] < -point[k, SLOW]:
+            back = -point[k, RESTITUTION] * point[k, PARTING]
+        gap, bend = point[k, GAP], point[k, BEND]
+        if gap - bend < -_DEEP * point[k, INRADIUS]:
+            lift = min(-0.1 * gap / duration, point[k, SLOW]) if gap < 0.0 else -gap / duration
+            back = max(back, bend / duration + lift)
+        if back > 0.0:
+            wanted[k] = back
             anything = True
     return anything
 
