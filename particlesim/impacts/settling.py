@@ -38,9 +38,11 @@ from particlesim.vec import along, dot, put, row, sub, vector
 # Rounds over all contact points. Piles that lie still need one or two, as they start from the forces of before.
 _MAX_SWEEPS = 100
 
-# Rounds while some gap may still close by more than this fraction of the inscribed radius too much.
-_MAX_URGENT_SWEEPS = 1000
-_URGENT = 1e-6
+# They are gone through so many times while some gap may still close too far by more than a fraction _URGENT of the
+# inscribed radius, or as long as energy is gained, by more than a fraction _ROUNDING of what lifts a radius high.
+_MAX_REPEATS = 10
+_URGENT = 1e-5
+_ROUNDING = 1e-13
 
 # Rounds end when no speed at a contact point changes by more than this fraction of what gravity adds in the stretch.
 _CONVERGED = 1e-9
@@ -87,7 +89,8 @@ def _press(partner, point, lightness, wanted, small, duration, motion, impulse):
     what bears on a heap from above is soon known at its foot. Returns whether it is done.
     """
     count, walls = len(impulse), len(motion) - 1
-    for sweep in range(_MAX_URGENT_SWEEPS):
+    change = sinking = 0.0
+    for sweep in range(_MAX_SWEEPS):
         change = sinking = 0.0
         for step in range(count):
             k = step if sweep % 2 == 0 else count - 1 - step
@@ -99,9 +102,9 @@ def _press(partner, point, lightness, wanted, small, duration, motion, impulse):
                 impulse[k] += more
                 change = max(change, abs(lack))
                 sinking = max(sinking, abs(lack) * duration / point[k, INRADIUS])
-        if change <= small or (sweep >= _MAX_SWEEPS and sinking <= _URGENT):
-            return True
-    return False
+        if change <= small:
+            break
+    return change, sinking
 
 
 @kernel
@@ -190,8 +193,20 @@ def _affordable(mass, fall, pressed, start, low, high):
 
 
 @kernel
-def _mark(partner, impulse, pressed):
-    """Mark the bodies that the impulses act on."""
+def _lift(constants, gravity, pressed):
+    """The energy that lifts pressed bodies by their radii [J]."""
+    energy = 0.0
+    for i in range(len(pressed)):
+        if pressed[i]:
+            energy += constants.mass[i] * constants.radius[i]
+    return energy * math.sqrt(dot(gravity, gravity))
+
+
+@kernel
+def _mark(partner, impulse, pressed, afresh):
+    """Mark the bodies that the impulses act on; ``afresh`` no others, else those marked before too."""
+    for i in range(len(pressed)):
+        pressed[i] = pressed[i] and not afresh
     for k in range(len(impulse)):
         if impulse[k] > 0.0:
             pressed[partner[k, 0]] = True
@@ -227,24 +242,34 @@ def settle(world, constants, state, spin, partner, point, duration, impulse, acc
         wanted[k] = -max(point[k, GAP] - point[k, BEND], 0.0) / duration
         a, b = _rows_of(partner, k, count)
         _push(motion, lightness, point, a, b, k, impulse[k])
-    done = _press(partner, point, lightness, wanted, small, duration, motion, impulse)
     pressed = np.zeros(count, dtype=np.bool_)
-    _mark(partner, impulse, pressed)
-    momentum = _turned(partner, point, impulse, state.angular_momentum)
+    momentum = state.angular_momentum.copy()
+    at_first, done = (start, state.angular_momentum), False
+    for _ in range(_MAX_REPEATS):
+        change, sinking = _press(partner, point, lightness, wanted, small, duration, motion, impulse)
+        _mark(partner, impulse, pressed, True)
+        momentum = _turned(partner, point, impulse, state.angular_momentum)
+        gain = _gain(mass, fall, pressed, at_first, (motion, momentum))
+        done = sinking <= _URGENT
+        if change <= small or (done and gain <= _ROUNDING * _lift(constants, g, pressed)):
+            break
     if _raise(point, impulse, duration, wanted):
         low, before = (motion.copy(), momentum), impulse.copy()
-        done = _press(partner, point, lightness, wanted, small, duration, motion, impulse) and done
-        _mark(partner, impulse, pressed)
+        for _ in range(_MAX_REPEATS):
+            _, sinking = _press(partner, point, lightness, wanted, small, duration, motion, impulse)
+            if sinking <= _URGENT:
+                break
+        done = done and sinking <= _URGENT
+        _mark(partner, impulse, pressed, False)
         high = motion, _turned(partner, point, impulse, state.angular_momentum)
-        share = _affordable(mass, fall, pressed, (start, state.angular_momentum), low, high)
+        share = _affordable(mass, fall, pressed, at_first, low, high)
         for i in range(count):
             for k in range(6):
                 motion[i, k] = low[0][i, k] + share * (motion[i, k] - low[0][i, k])
-            pressed[i] = False
         for k in range(len(impulse)):
             impulse[k] = before[k] + share * (impulse[k] - before[k])
         momentum = _turned(partner, point, impulse, state.angular_momentum)
-        _mark(partner, impulse, pressed)
+        _mark(partner, impulse, pressed, True)
     for i in range(len(mass)):
         if pressed[i]:
             put(state.velocity, i, _velocity_in(motion, i))
