@@ -40,7 +40,7 @@ _MAX_SWEEPS = 100
 
 # They are gone through so many times while some gap may still close too far by more than a fraction _URGENT of the
 # inscribed radius, or as long as energy is gained, by more than a fraction _ROUNDING of what lifts a radius high.
-_MAX_REPEATS = 10
+_MAX_REPEATS = 2
 _URGENT = 1e-5
 _ROUNDING = 1e-13
 
