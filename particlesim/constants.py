@@ -35,6 +35,12 @@ RESTING_DROP = 1e-3
 # is inclined by when one of its edges lies and the other is a few RESTING_DROP away.
 RESTING_TILT = 1e-2
 
+# Whether a particle is in no cluster of what comes to rest, settles with one, or does and may still meet others of it
+# as if it did not (see impacts/cluster.py).
+FREE = 0
+SETTLES = 1
+LOOSE = 2
+
 # What rebounds in full rests only if it is this much slower and nearer than what does not: energy is kept to 1e-14.
 STILL = 1e-6
 

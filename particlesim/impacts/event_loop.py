@@ -10,12 +10,12 @@ import numpy as np
 from particlesim.constants import MAX_IMPACTS, MAX_MANIFOLD, MAX_SLOW_IMPACTS, SIMULTANEOUS
 from particlesim.impacts.course import NOTHING_MET, PIECE, UNCHAINED, path_of_state, write_piece
 from particlesim.impacts.next_impact import body_of, later, pair_meets, wall_meets
-from particlesim.impacts.response import LANDED, NOTHING, STRUCK, answer, is_held
+from particlesim.impacts.response import NOTHING, STRUCK, answer, let_go
 from particlesim.impacts.sieve import grown
 from particlesim.impacts.two_spheres import answer_two, meet_alone
 from particlesim.jit import borrowed, kernel
 from particlesim.narrow_phase.contacts import wall_as_partner
-from particlesim.vec import dot, put, put4, row, vector
+from particlesim.vec import put, put4, row
 
 
 @kernel
@@ -128,17 +128,6 @@ def _bring(state, course, constants, i, time):
         put(state.position, i, position)
         put4(state.orientation, i, turn)
         put(state.velocity, i, velocity)
-
-
-@kernel
-def _pull_after(world, state, acceleration, outcome, i):
-    """The acceleration of a particle after an impact.
-
-    What is struck is held no more. What landed is held, unless it rises: without gravity it would gain energy.
-    """
-    gravity = vector(world.gravity)
-    held = is_held(acceleration, i) or dot(gravity, row(state.velocity, i)) >= 0.0
-    return (0.0, 0.0, 0.0) if outcome == LANDED and held else gravity
 
 
 @kernel
@@ -258,7 +247,7 @@ def run_islands(
                 i = whom[m]
                 stamp[i] += 1
                 if outcome != NOTHING:
-                    put(course.acceleration, i, _pull_after(world, state, course.acceleration, outcome, i))
+                    let_go(world, constants, course.acceleration, i, duration - time, tally[members[0]])
                 write_piece(piece, pieces, time, state, course.acceleration, i)
                 particle[pieces, 0] = i
                 pieces += 1

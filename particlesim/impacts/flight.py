@@ -135,7 +135,9 @@ class Flight:
         with self._spent_on("respond"):
             self._resting.hold(self._neighbours, course.acceleration, duration)
         with self._spent_on("contacts"):
-            met, times = first_meetings(self._where(log), self._neighbours, self._ball, duration)
+            met, times = first_meetings(
+                self._where(log), self._neighbours, self._ball, self._resting.standing, duration
+            )
             starts = np.flatnonzero(np.diff(met[:, 0], prepend=-1))
             self._first_met[met[starts, 0]] = starts
         touched = [newly_touched(course.touched, met)]
@@ -206,7 +208,7 @@ class Flight:
         self.counts.virial += float(total[VIRIAL]) + self._resting.virial
         self.counts.wall_impulse[: len(total) - WALLS] += total[WALLS:]
         self.counts.wall_impulse += self._resting.wall_impulse
-        self.counts.unresolved += unfinished > 0
+        self.counts.unresolved += unfinished > 0 or self._resting.unresolved
 
     def _fly_on(self, duration: float) -> None:
         """Bring everyone to the end of the stretch."""

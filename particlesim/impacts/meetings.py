@@ -214,21 +214,32 @@ def _met(
 
 
 def first_meetings(
-    where: Where, neighbours: Neighbours, ball: np.ndarray, duration: float
+    where: Where, neighbours: Neighbours, ball: np.ndarray, standing: np.ndarray, duration: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Who meets whom within ``duration`` [s] if all go on as they are: pairs (m, 2), sorted, and times (m,).
 
-    Partners below 0 are walls. ``ball`` (n, 8) is filled in (see sieve.py).
+    Partners below 0 are walls. ``ball`` (n, 8) is filled in (see sieve.py). ``standing`` (n,) says who settles
+    together: they do not meet.
     """
     table, world, constants, state, course, _ = where
     count, at = len(constants.radius), neighbours
     moving = constants.radius, state.position, state.velocity, course.acceleration
     crew = Crew(count)
     alike = all(crew.each(lambda _, first, last: balls(*moving, at.lists.place, duration, ball, first, last), count))
-    among = course.acceleration, alike, ball, at.lists.particle, at.later_start, at.later, world.period, duration
+    among = (
+        course.acceleration,
+        alike,
+        ball,
+        standing,
+        at.lists.particle,
+        at.later_start,
+        at.later,
+        world.period,
+        duration,
+    )
     parts = crew.each(lambda _, first, last: sieve(table.kind, constants.shape, *among, first, last), count)
     if (world.boundary == WALL).any():
-        walls = table.kind, constants.shape, *moving, world.lower, world.upper, world.boundary, duration
+        walls = table.kind, constants.shape, *moving, standing, world.lower, world.upper, world.boundary, duration
         parts += crew.each(lambda _, first, last: sieve_walls(*walls, first, last), count)
     pairs, slots, times = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     pairs, times = _met(where, pairs, neighbours.normal, slots[:, 0], times[:, 0], duration)

@@ -11,15 +11,16 @@ import math
 
 import numpy as np
 
-from particlesim.constants import APPROACH_TOLERANCE, MAX_MANIFOLD, MAX_PATCH_IMPULSES, RESTING_DROP
+from particlesim.constants import APPROACH_TOLERANCE, MAX_MANIFOLD, MAX_PATCH_IMPULSES, RESTING_DROP, WALL
 from particlesim.jit import kernel
 from particlesim.motion import particle_spin, spin_of
 from particlesim.narrow_phase.contacts import contact_now, wall_of_partner
+from particlesim.narrow_phase.walls import wall_normal
 from particlesim.vec import add, along, cross, dot, norm, put, row, row4, scaled, sub, vector
 
-# What came of contacts: they did not approach, met fast, met slowly and rebounded in full until they come to rest, met
-# slowly what is held, or are both held, to where they do not close by more than rounding until the next stretch.
-NOTHING, STRUCK, REBOUNDED, LANDED, LEFT = 0, 1, 2, 3, 4
+# What came of contacts: they did not approach, met fast, met slowly and rebounded in full until they come to rest, or
+# met slowly and are both held, which is left to the next stretch.
+NOTHING, STRUCK, REBOUNDED, LEFT = 0, 1, 2, 3
 
 # Columns of an island's tally: impacts, the virial, then the impulse on each of six walls.
 IMPACTS, VIRIAL, WALLS = 0, 1, 2
@@ -147,6 +148,22 @@ def is_held(acceleration, i):
 
 
 @kernel
+def let_go(world, constants, acceleration, i, left, tally):
+    """Let gravity act again on particle ``i``, which was struck with ``left`` [s] of the stretch to go.
+
+    If it was held, it has had its share of gravity for the whole stretch. What it weighs is no longer borne by the
+    walls that gravity presses against.
+    """
+    gravity = vector(world.gravity)
+    if is_held(acceleration, i):
+        for wall in range(6):
+            pull = dot(wall_normal(wall), gravity)
+            if world.boundary[wall // 2] == WALL and pull > 0.0:
+                tally[WALLS + wall] -= constants.mass[i] * pull * left
+    put(acceleration, i, gravity)
+
+
+@kernel
 def _turns_slowly(constants, state, i, speed):
     """Whether rotation moves no point of particle ``i`` faster than ``speed`` [m/s]; walls do not turn."""
     return i < 0 or norm(particle_spin(constants, state, i)) * constants.radius[i] <= speed
@@ -158,13 +175,10 @@ def _bounce(world, constants, state, acceleration, i, j, speed):
     restitution, resting = restitution_of(world, constants, i, j)
     if restitution == 1.0 or speed > resting:
         return STRUCK, 1.0 + restitution
-    held_i, held_j = is_held(acceleration, i), is_held(acceleration, j)
-    if not (held_i or held_j):
-        return REBOUNDED, 2.0
-    both = held_i and held_j
-    if both and _turns_slowly(constants, state, i, resting) and _turns_slowly(constants, state, j, resting):
+    held = is_held(acceleration, i) and is_held(acceleration, j)
+    if held and _turns_slowly(constants, state, i, resting) and _turns_slowly(constants, state, j, resting):
         return LEFT, 0.0
-    return LANDED, 1.0
+    return REBOUNDED, 2.0
 
 
 @kernel
@@ -173,7 +187,7 @@ def answer(table, world, constants, state, acceleration, contacts, count, whom, 
 
     ``whom`` lists the ``size`` particles in them; with ``leave_slow`` those that may come to rest are left to
     the next stretch of time. Adds to ``tally`` and returns what came of it: NOTHING if nothing approached, else
-    the first of STRUCK, REBOUNDED and LANDED that happened anywhere.
+    STRUCK if that happened anywhere, or REBOUNDED.
     """
     points = np.empty((count, MAX_MANIFOLD, 3))
     corners = np.empty(count, dtype=np.int64)

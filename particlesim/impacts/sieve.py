@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from particlesim.constants import SPHERE, WALL
+from particlesim.constants import SETTLES, SPHERE, WALL
 from particlesim.impacts.neighbours import around_of, far_apart
 from particlesim.impacts.time_of_impact import sphere_meets_wall, spheres_meet
 from particlesim.jit import borrowed, kernel
@@ -80,14 +80,17 @@ def _pair_time(spheres, ball, p, q, period, duration):
 
 
 @kernel
-def sieve(kind, shape, acceleration, alike, ball, particle, later_start, later, period, duration, first, last):
+def sieve(
+    kind, shape, acceleration, alike, ball, standing, particle, later_start, later, period, duration, first, last
+):  # fmt: skip
     """Pairs (m, 2), i < j, of places ``first .. last`` with later neighbours that meet, or may, in ``duration`` [s].
 
     And where they stand in ``later`` (m, 1), and times (m, 1): when they meet, or -1 where the bounding spheres come
     together and more must be known. Where not all are known to accelerate ``alike``, it is looked at for each pair.
+    What settles together (see cluster.py) is not looked at.
     """
     kind, shape, acceleration, ball, particle = borrowed((kind, shape, acceleration, ball, particle))
-    later_start, later, period = borrowed((later_start, later, period))
+    standing, later_start, later, period = borrowed((standing, later_start, later, period))
     around = around_of(period)
     found, slots = np.empty((256, 2), dtype=np.int64), np.empty((256, 1), dtype=np.int64)
     times = np.empty((256, 1))
@@ -101,6 +104,8 @@ def sieve(kind, shape, acceleration, alike, ball, particle, later_start, later, 
                 continue
             one, two = (p, q) if particle[p] < particle[q] else (q, p)
             i, j = particle[one], particle[two]
+            if standing[i] == SETTLES and standing[j] == SETTLES:
+                continue
             pull = sub(row(acceleration, j), row(acceleration, i)) if not alike else (0.0, 0.0, 0.0)
             time = -1.0
             if pull[0] == 0.0 and pull[1] == 0.0 and pull[2] == 0.0:
@@ -113,16 +118,19 @@ def sieve(kind, shape, acceleration, alike, ball, particle, later_start, later, 
 
 @kernel
 def sieve_walls(
-    kind, shape, radius, position, velocity, acceleration, lower, upper, boundary, duration, first, last
+    kind, shape, radius, position, velocity, acceleration, standing, lower, upper, boundary, duration, first, last
 ):  # fmt: skip
     """As ``sieve``, of particles ``first .. last`` with walls, which are partners below 0 and stand nowhere: -1."""
     kind, shape, radius, position, velocity, acceleration = borrowed(
         (kind, shape, radius, position, velocity, acceleration)
     )
+    standing = borrowed(standing)
     found, slots = np.empty((256, 2), dtype=np.int64), np.empty((256, 1), dtype=np.int64)
     times = np.empty((256, 1))
     count = 0
     for i in range(first, last):
+        if standing[i] == SETTLES:
+            continue
         if count + 6 > len(found):
             found, slots, times = grown(found), grown(slots), grown(times)
         x, v, a = row(position, i), row(velocity, i), row(acceleration, i)

@@ -61,21 +61,13 @@ def hull_separation(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b,
 
 
 @kernel(inline=True)
-def tilted_patch(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, tilt, points, gaps):
-    """Separation, normal and number of contact points of two hulls, and the gap at each (see hull_patch)."""
+def hull_hull(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
+    """Separation, normal from a to b and number of contact points of hull b at ``offset`` from hull a."""
+    gaps = np.empty(MAX_MANIFOLD)
     matrix_a, matrix_b = matrix_of(turn_a), matrix_of(turn_b)
     separation, normal, middle = hull_separation(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset)
     count = hull_patch(
         table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b,
-        offset, normal, separation, middle, tilt, points, gaps,
+        offset, normal, separation, middle, PARALLEL_TOLERANCE, 0.0, points, gaps,
     )  # fmt: skip
     return separation, normal, count
-
-
-@kernel(inline=True)
-def hull_hull(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
-    """Separation, normal from a to b and number of contact points of hull b at ``offset`` from hull a."""
-    gaps = np.empty(MAX_MANIFOLD)
-    return tilted_patch(
-        table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, PARALLEL_TOLERANCE, points, gaps
-    )

@@ -41,13 +41,18 @@ def facing_feature(table, shape, size, matrix, offset, direction, tilt, feature)
     # Taken out of their struct once: each access counts references, which costs more than the arithmetic.
     face_normal, loop, loop_start = table.face_normal, table.loop, table.loop_start
     vertices = table.vertex[table.vertex_start[shape] : table.vertex_start[shape + 1]]
+    face, least = -1, tilt
     for f in range(table.face_start[shape], table.face_start[shape + 1]):
         n = row(face_normal, f)
-        if dot(n, local) > 0.0 and norm(cross(n, local)) < tilt:
-            first, last = loop_start[f], loop_start[f + 1]
-            for k in range(first, last):
-                put(feature, k - first, add(offset, apply(matrix, scaled(row(vertices, loop[k]), size))))
-            return last - first, True
+        if dot(n, local) > 0.0:
+            slope = norm(cross(n, local))
+            if slope < least:
+                face, least = f, slope
+    if face >= 0:
+        first, last = loop_start[face], loop_start[face + 1]
+        for k in range(first, last):
+            put(feature, k - first, add(offset, apply(matrix, scaled(row(vertices, loop[k]), size))))
+        return last - first, True
     best, reach = 0, -math.inf
     for v in range(len(vertices)):
         r = dot(row(vertices, v), local)
@@ -81,31 +86,48 @@ def _clip(polygon, count, side, bound, clipped):
 
 
 @kernel
-def _clip_to_face(face, corners, normal, incident, count, spare):
-    """Clip ``incident`` in place to the prism over a face whose outward normal is given; returns its corners."""
+def _clip_to_face(face, corners, normal, margin, incident, count, spare):
+    """Clip ``incident`` in place to the prism over a face, wider by ``margin``, whose outward normal is given.
+
+    Returns how many corners it has then.
+    """
     for k in range(corners):
         p = row(face, k)
         edge = sub(row(face, (k + 1) % corners), p)
         side = cross(edge, normal)
-        count = _clip(incident, count, side, dot(side, p) + _ON_EDGE * dot(edge, edge), spare)
+        count = _clip(incident, count, side, dot(side, p) + _ON_EDGE * dot(edge, edge) + margin * norm(side), spare)
         for m in range(count):
             put(incident, m, row(spare, m))
     return count
 
 
 @kernel
-def _shared_by_edges(edge_a, edge_b, points):
-    """Points that two edges facing each other share: a segment's two ends if parallel, else their crossing."""
+def _shared_by_edges(edge_a, edge_b, normal, separation, margin, points, gaps):
+    """Points of edge a that two edges facing each other share, and the gaps there; returns how many.
+
+    Those are a segment's two ends if they are parallel, else their crossing, or the ends of what runs within
+    ``margin`` of it [m].
+    """
     a, b = row(edge_a, 0), row(edge_b, 0)
     u, v = sub(row(edge_a, 1), a), sub(row(edge_b, 1), b)
     length_u, length_v = norm(u), norm(v)
+    t0, t1 = dot(sub(b, a), u) / length_u**2, dot(sub(row(edge_b, 1), a), u) / length_u**2
+    start, end = max(min(t0, t1), 0.0), min(max(t0, t1), 1.0)
+    gaps[0] = gaps[1] = separation
     n = cross(u, v)
     if norm(n) > PARALLEL_TOLERANCE * length_u * length_v:
         t = dot(cross(sub(b, a), v), n) / dot(n, n)
         put(points, 0, along(a, u, min(max(t, 0.0), 1.0)))
-        return 1
-    t0, t1 = dot(sub(b, a), u) / length_u**2, dot(sub(row(edge_b, 1), a), u) / length_u**2
-    start, end = max(min(t0, t1), 0.0), min(max(t0, t1), 1.0)
+        near = margin * length_v / norm(n)
+        start, end = max(start, t - near), min(end, t + near)
+        if margin == 0.0 or end <= start:
+            return 1
+        for k in range(2):
+            t = start if k == 0 else end
+            of_a, of_b = along(a, u, t), along(b, v, (t - t0) / (t1 - t0))
+            put(points, k, of_a)
+            gaps[k] = dot(normal, sub(of_b, of_a))
+        return 2
     put(points, 0, along(a, u, start))
     if end <= start:
         return 1
@@ -114,14 +136,23 @@ def _shared_by_edges(edge_a, edge_b, points):
 
 
 @kernel
+def _way_to_face(face, corners, direction, point):
+    """How far it is from a point along ``direction`` to the plane of a face, which must not be parallel to it."""
+    start = row(face, 0)
+    n = cross(sub(row(face, corners // 3), start), sub(row(face, 2 * corners // 3), start))
+    return dot(n, sub(start, point)) / dot(n, direction)
+
+
+@kernel
 def hull_patch(
-    table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset, normal, separation, middle, tilt, points, gaps
-):
+    table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset, normal, separation, middle, tilt, margin,
+    points, gaps,
+):  # fmt: skip
     """Write the contact points of two hulls, half way between them, relative to a's centroid; returns how many.
 
     ``normal`` points from a to b. Faces and edges inclined by less than ``tilt`` [sine of the angle] touch along a
-    patch; ``middle`` stands in where such features share no point. ``points`` is (MAX_MANIFOLD, 3), ``gaps`` how far
-    apart the hulls are at each of them.
+    patch, which may stand out by ``margin`` [m] over their borders; ``middle`` stands in where such features share no
+    point. ``points`` is (MAX_MANIFOLD, 3), ``gaps`` how far apart the hulls are at each of them.
     """
     of_a, of_b = np.empty((MAX_CORNERS, 3)), np.empty((MAX_CORNERS, 3))
     spare = np.empty((MAX_CORNERS, 3))
@@ -135,12 +166,12 @@ def hull_patch(
         patch, shift, count = of_b, -0.5 * separation, 1
     elif face_a:
         patch, shift = of_b, -0.5 * separation
-        count = _clip_to_face(of_a, count_a, normal, of_b, count_b, spare)
+        count = _clip_to_face(of_a, count_a, normal, margin, of_b, count_b, spare)
     elif face_b:
-        count = _clip_to_face(of_b, count_b, back, of_a, count_a, spare)
+        count = _clip_to_face(of_b, count_b, back, margin, of_a, count_a, spare)
     else:
         patch = spare
-        count = _shared_by_edges(of_a, of_b, spare)
+        count = _shared_by_edges(of_a, of_b, normal, separation, margin, spare, gaps)
     if count == 0:
         put(points, 0, middle)
         gaps[0] = separation
@@ -149,9 +180,10 @@ def hull_patch(
     for k in range(kept):
         corner = row(patch, k * count // kept)
         put(points, k, along(corner, normal, shift))
-        gaps[k] = separation
-        if face_a and count_b > 1:
-            gaps[k] = dot(normal, sub(corner, row(of_a, 0)))
-        elif face_b and count_a > 1:
-            gaps[k] = dot(normal, sub(row(of_b, 0), corner))
+        if count_a == 1 or count_b == 1:
+            gaps[k] = separation
+        elif face_a:
+            gaps[k] = -_way_to_face(of_a, count_a, normal, corner)
+        elif face_b:
+            gaps[k] = _way_to_face(of_b, count_b, normal, corner)
     return kept

@@ -1,0 +1,278 @@
+"""How bodies that settle move on for a stretch of time: all their contact points at once.
+
+Gravity acts for the whole stretch at once. Impulses, none of which pulls, then leave no contact point closing more
+than its gap (J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, 1988; gaps as in
+M. Anitescu, F. A. Potra, Nonlinear Dynamics 14 (1997) 231-247); they are found by going round the points (M. Jean,
+Computer Methods in Applied Mechanics and Engineering 177 (1999) 235-257). What is pressed moves on steadily for the
+stretch, what is not falls as ever.
+
+The new velocities are the nearest, by their kinetic energy, to those with gravity that close no gap. So the energy,
+with what the bodies lose of their height, falls by the kinetic energy of the change in velocity, and never rises.
+Points that met fast then part as their restitution says, and what has sunk in is lifted, as far as that energy goes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from particlesim.impacts.cluster import (
+    BEND,
+    GAP,
+    INRADIUS,
+    LEVER_I,
+    LEVER_J,
+    MASS,
+    NORMAL,
+    PARTING,
+    RESTITUTION,
+    SLOW,
+    TWIST_I,
+    TWIST_J,
+    column,
+)
+from particlesim.jit import borrowed, kernel
+from particlesim.vec import along, dot, put, row, sub, vector
+
+# Rounds over all contact points. Piles that lie still need one or two, as they start from the forces of before.
+_MAX_SWEEPS = 100
+
+# They are gone through so many times while some gap may still close too far by more than a fraction _URGENT of the
+# inscribed radius, or as long as energy is gained, by more than a fraction _ROUNDING of what lifts a radius high.
+_MAX_REPEATS = 2
+_URGENT = 1e-5
+_ROUNDING = 1e-13
+
+# Rounds end when no speed at a contact point changes by more than this fraction of what gravity adds in the stretch.
+_CONVERGED = 1e-9
+
+# Contact points that have sunk deeper than this fraction of the inscribed radius are lifted, by a tenth at a time.
+_DEEP = 2e-5
+
+
+@kernel
+def _rows_of(partner, k, world):
+    """The rows of the two partners of a contact point in an array of motions, whose row ``world`` is the walls'."""
+    return partner[k, 0], partner[k, 1] if partner[k, 1] >= 0 else world
+
+
+@kernel
+def _push(motion, lightness, point, i, j, k, impulse):
+    """Give the impulse of a contact point to the motions in rows ``i`` and ``j``."""
+    of_i, of_j = impulse * lightness[i], impulse * lightness[j]
+    for axis in range(3):
+        normal = point[k, NORMAL + axis]
+        motion[i, axis] -= of_i * normal
+        motion[j, axis] += of_j * normal
+        motion[i, 3 + axis] -= impulse * point[k, TWIST_I + axis]
+        motion[j, 3 + axis] += impulse * point[k, TWIST_J + axis]
+
+
+@kernel
+def _parting(motion, point, i, j, k):
+    """Speed at which the motions in rows ``i`` and ``j`` part at a contact point."""
+    parting = 0.0
+    for axis in range(3):
+        parting += point[k, NORMAL + axis] * (motion[j, axis] - motion[i, axis])
+        parting += point[k, LEVER_J + axis] * motion[j, 3 + axis] - point[k, LEVER_I + axis] * motion[i, 3 + axis]
+    return parting
+
+
+@kernel
+def _press(partner, point, lightness, wanted, small, duration, motion, impulse):
+    """Change ``impulse`` (m,) and ``motion`` until partners part at each point at the speed ``wanted`` at least.
+
+    ``motion`` (n + 1, 6) are velocities and spins, with a row for the walls; ``lightness`` (n + 1,) is 1 / mass.
+    Ends when no such speed changes by more than ``small`` [m/s], or after _MAX_SWEEPS rounds, _MAX_URGENT_SWEEPS if it
+    matters. Up and down by turns:
+    what bears on a heap from above is soon known at its foot. Returns whether it is done.
+    """
+    count, walls = len(impulse), len(motion) - 1
+    change = sinking = 0.0
+    for sweep in range(_MAX_SWEEPS):
+        change = sinking = 0.0
+        for step in range(count):
+            k = step if sweep % 2 == 0 else count - 1 - step
+            i, j = _rows_of(partner, k, walls)
+            lack = wanted[k] - _parting(motion, point, i, j, k)
+            more = max(-impulse[k], lack * point[k, MASS])
+            if more != 0.0:
+                _push(motion, lightness, point, i, j, k, more)
+                impulse[k] += more
+                change = max(change, abs(lack))
+                sinking = max(sinking, abs(lack) * duration / point[k, INRADIUS])
+        if change <= small:
+            break
+    return change, sinking
+
+
+@kernel
+def _turned(partner, point, impulse, before):
+    """The angular momenta (n, 3) after the impulses, from those ``before``."""
+    after = before.copy()
+    for k in range(len(impulse)):
+        i, j = partner[k, 0], partner[k, 1]
+        put(after, i, along(row(after, i), column(point, k, LEVER_I), -impulse[k]))
+        if j >= 0:
+            put(after, j, along(row(after, j), column(point, k, LEVER_J), impulse[k]))
+    return after
+
+
+@kernel
+def _raise(point, impulse, duration, wanted):
+    """Add what restitution and depth want of the speeds at contact points; returns whether that is anything."""
+    anything = False
+    for k in range(len(impulse)):
+        back = 0.0
+        if impulse[k] > 0.0 and point[k, PARTING] < -point[k, SLOW]:
+            back = -point[k, RESTITUTION] * point[k, PARTING]
+        gap, bend = point[k, GAP], point[k, BEND]
+        if gap - bend < -_DEEP * point[k, INRADIUS]:
+            lift = min(-0.1 * gap / duration, point[k, SLOW]) if gap < 0.0 else -gap / duration
+            back = max(back, bend / duration + lift)
+        if back > 0.0:
+            wanted[k] = back
+            anything = True
+    return anything
+
+
+@kernel
+def _velocity_in(motion, i):
+    """Velocity of body ``i``."""
+    return motion[i, 0], motion[i, 1], motion[i, 2]
+
+
+@kernel
+def _spin_in(motion, i):
+    """Angular velocity of body ``i``."""
+    return motion[i, 3], motion[i, 4], motion[i, 5]
+
+
+@kernel
+def _gain(mass, fall, pressed, old, new):
+    """Energy that bodies gain by going from ``old`` to ``new``: each the motion and the angular momentum (n, 3).
+
+    ``fall`` is gravity times the duration [m/s].
+    """
+    gain = 0.0
+    for i in range(len(mass)):
+        if pressed[i]:
+            v, w = _velocity_in(old[0], i), _velocity_in(new[0], i)
+            gain += mass[i] * (0.5 * dot(w, w) - 0.5 * dot(v, v) - dot(fall, w))
+            gain += 0.5 * (dot(_spin_in(new[0], i), row(new[1], i)) - dot(_spin_in(old[0], i), row(old[1], i)))
+    return gain
+
+
+@kernel
+def _difference(mass, pressed, one, two):
+    """Kinetic energy of the difference between two motions, each with the angular momentum."""
+    energy = 0.0
+    for i in range(len(mass)):
+        if pressed[i]:
+            v = sub(_velocity_in(two[0], i), _velocity_in(one[0], i))
+            spin, turn = sub(_spin_in(two[0], i), _spin_in(one[0], i)), sub(row(two[1], i), row(one[1], i))
+            energy += 0.5 * (mass[i] * dot(v, v) + dot(spin, turn))
+    return energy
+
+
+@kernel
+def _affordable(mass, fall, pressed, start, low, high):
+    """How far to go from the motion ``low`` towards ``high`` so that no energy is gained from the ``start``, 0 to 1."""
+    of_low = min(_gain(mass, fall, pressed, start, low), 0.0)
+    of_high = _gain(mass, fall, pressed, start, high)
+    if of_high <= 0.0:
+        return 1.0
+    # The gain is a parabola in how far one goes.
+    square = _difference(mass, pressed, low, high)
+    linear = of_high - of_low - square
+    root = math.sqrt(max(linear * linear - 4.0 * square * of_low, 0.0))
+    denominator = linear + root
+    share = -2.0 * of_low / denominator if denominator > 0.0 else 0.0
+    return min(max(share, 0.0), 1.0)
+
+
+@kernel
+def _lift(constants, gravity, pressed):
+    """The energy that lifts pressed bodies by their radii [J]."""
+    energy = 0.0
+    for i in range(len(pressed)):
+        if pressed[i]:
+            energy += constants.mass[i] * constants.radius[i]
+    return energy * math.sqrt(dot(gravity, gravity))
+
+
+@kernel
+def _mark(partner, impulse, pressed, afresh):
+    """Mark the bodies that the impulses act on; ``afresh`` no others, else those marked before too."""
+    for i in range(len(pressed)):
+        pressed[i] = pressed[i] and not afresh
+    for k in range(len(impulse)):
+        if impulse[k] > 0.0:
+            pressed[partner[k, 0]] = True
+            if partner[k, 1] >= 0:
+                pressed[partner[k, 1]] = True
+
+
+@kernel
+def settle(world, constants, state, spin, partner, point, duration, impulse, acceleration):
+    """Give pressed bodies the velocity and angular momentum with which they go on steadily for ``duration`` [s].
+
+    ``impulse`` (m,) holds a guess of the impulses at the contact points, and is what they are in the end. ``spin``
+    (n, 3) are the angular velocities now. Pressed bodies have an ``acceleration`` (n, 3) of 0. Returns which they are,
+    and whether the impulses are good enough.
+    """
+    world, constants, state = borrowed((world, constants, state))
+    mass = constants.mass
+    g = vector(world.gravity)
+    fall = g[0] * duration, g[1] * duration, g[2] * duration
+    small = _CONVERGED * math.sqrt(dot(fall, fall))
+    count = len(mass)
+    start, lightness = np.zeros((count + 1, 6)), np.zeros(count + 1)
+    for i in range(count):
+        lightness[i] = 1.0 / mass[i]
+        for axis in range(3):
+            start[i, axis], start[i, 3 + axis] = state.velocity[i, axis], spin[i, axis]
+    motion = start.copy()
+    for i in range(count):
+        for axis in range(3):
+            motion[i, axis] += fall[axis]
+    wanted = np.empty(len(impulse))
+    for k in range(len(impulse)):
+        wanted[k] = -max(point[k, GAP] - point[k, BEND], 0.0) / duration
+        a, b = _rows_of(partner, k, count)
+        _push(motion, lightness, point, a, b, k, impulse[k])
+    pressed = np.zeros(count, dtype=np.bool_)
+    momentum = state.angular_momentum.copy()
+    at_first, done = (start, state.angular_momentum), False
+    for _ in range(_MAX_REPEATS):
+        change, sinking = _press(partner, point, lightness, wanted, small, duration, motion, impulse)
+        _mark(partner, impulse, pressed, True)
+        momentum = _turned(partner, point, impulse, state.angular_momentum)
+        gain = _gain(mass, fall, pressed, at_first, (motion, momentum))
+        done = sinking <= _URGENT
+        if change <= small or (done and gain <= _ROUNDING * _lift(constants, g, pressed)):
+            break
+    if _raise(point, impulse, duration, wanted):
+        low, before = (motion.copy(), momentum), impulse.copy()
+        for _ in range(_MAX_REPEATS):
+            _, sinking = _press(partner, point, lightness, wanted, small, duration, motion, impulse)
+            if sinking <= _URGENT:
+                break
+        done = done and sinking <= _URGENT
+        _mark(partner, impulse, pressed, False)
+        high = motion, _turned(partner, point, impulse, state.angular_momentum)
+        share = _affordable(mass, fall, pressed, at_first, low, high)
+        for i in range(count):
+            for k in range(6):
+                motion[i, k] = low[0][i, k] + share * (motion[i, k] - low[0][i, k])
+        for k in range(len(impulse)):
+            impulse[k] = before[k] + share * (impulse[k] - before[k])
+        momentum = _turned(partner, point, impulse, state.angular_momentum)
+        _mark(partner, impulse, pressed, True)
+    for i in range(len(mass)):
+        if pressed[i]:
+            put(state.velocity, i, _velocity_in(motion, i))
+            put(state.angular_momentum, i, row(momentum, i))
+            put(acceleration, i, (0.0, 0.0, 0.0))
+    return pressed, done

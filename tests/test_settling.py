@@ -1,0 +1,108 @@
+"""Stacks and heaps: what stands on each other, leans on each other or falls on what lies comes to rest."""
+
+import numpy as np
+import pytest
+
+from particlesim.simulation import Simulation
+from tests.worlds import listed, scene
+
+GRAVITY = (0.0, 0.0, -9.81)
+SHAPES = ("sphere", "cube", "pyramid")
+
+
+def followed(what, duration, pieces):
+    """The simulation after ``duration``, and the ledgers at the start and after each of so many pieces of it."""
+    sim = Simulation(what)
+    ledgers = [sim.ledger]
+    for _ in range(pieces):
+        sim.run(duration=duration / pieces)
+        ledgers.append(sim.ledger)
+    return sim, ledgers
+
+
+def only_falls(ledgers):
+    """Whether no energy is gained, but for what is left where the impulses are no longer made better (settling.py)."""
+    energies = np.array([ledger.energy for ledger in ledgers])
+    return (np.diff(energies) <= 1e-11 * energies[0]).all()
+
+
+def largest_overlap(ledgers):
+    return max(ledger.largest_overlap for ledger in ledgers)
+
+
+def momentum_unaccounted(sim, ledgers):
+    """What momentum, gravity and walls do not add up to, as a fraction of what gravity gave."""
+    first, last = ledgers[0], ledgers[-1]
+    walls = last.wall_impulse.reshape(3, 2)
+    weight = sim.particles.mass.sum() * np.array(GRAVITY)
+    given = last.momentum - first.momentum + walls[:, 1] - walls[:, 0]
+    return np.abs(given - weight * last.time).max() / np.abs(weight * last.time).max()
+
+
+def heap(count, *, seed=1, size=(0.8, 0.8, 2.0), **settings):
+    """Spheres, cubes and pyramids poured into a narrow box."""
+    groups = [{"shape": shape, "count": count, "size": 0.2, "restitution": 0.5} for shape in SHAPES]
+    return scene(*groups, size=size, gravity=GRAVITY, restitution=0.5, seed=seed, **settings)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_a_tower_of_cubes_stands(restitution):
+    poses = [{"position": (0, 0, -4.4 + 1.05 * k)} for k in range(6)]
+    tower = scene(listed("cube", *poses), size=(10, 10, 10), gravity=GRAVITY, restitution=restitution)
+    sim, ledgers = followed(tower, 2, 20)
+    assert only_falls(ledgers)
+    assert largest_overlap(ledgers) < 1e-4
+    assert sim.ledger.kinetic < 1e-6 * ledgers[0].energy
+    assert np.allclose(sim.particles.position[:, 2], -4.5 + np.arange(6), rtol=0, atol=1e-3)
+    assert momentum_unaccounted(sim, ledgers) < 1e-12
+    assert sim.ledger.unresolved == 0
+
+
+def test_cubes_laid_as_bricks_carry_each_other():
+    poses = [
+        {"position": (1.1 * (k - 0.5 * (2 - level)), 0, -4.5 + level)} for level in range(3) for k in range(3 - level)
+    ]
+    wall = scene(listed("cube", *poses), size=(10, 10, 10), gravity=GRAVITY, restitution=0.5)
+    sim, ledgers = followed(wall, 1, 5)
+    start = np.array([pose["position"] for pose in poses])
+    assert only_falls(ledgers)
+    assert np.allclose(sim.particles.position, start, rtol=0, atol=1e-6)
+    assert momentum_unaccounted(sim, ledgers) < 1e-12
+
+
+def test_what_lands_without_rebound_is_not_lifted_again():
+    dropped = {"position": (0, 0, 0.2), "orientation": {"axis": (1, 2, 0.5), "angle": 40}}
+    for shape in SHAPES:
+        sim, ledgers = followed(scene(listed(shape, dropped), size=(4, 4, 4), gravity=GRAVITY, restitution=0.0), 4, 40)
+        assert only_falls(ledgers)
+        assert largest_overlap(ledgers) < 1e-4
+        assert sim.ledger.kinetic < 1e-12 * ledgers[0].energy
+        assert momentum_unaccounted(sim, ledgers) < 1e-12
+
+
+def test_a_heap_of_all_shapes_calms_down():
+    sim, ledgers = followed(heap(10), 3, 30)
+    assert only_falls(ledgers)
+    assert sim.ledger.kinetic < 0.02 * max(ledger.kinetic for ledger in ledgers)
+    assert largest_overlap(ledgers[-5:]) < 1e-4 * 0.2
+    assert momentum_unaccounted(sim, ledgers) < 1e-12
+
+
+def test_a_heap_is_the_same_for_every_broad_phase_and_number_of_threads():
+    hashes = set()
+    for method, threads in [("octree", 1), ("grid", 2), ("naive", 3)]:
+        sim = Simulation(heap(5, size=(0.6, 0.6, 2.0)), broad_phase=method, threads=threads)
+        sim.run(duration=0.6)
+        hashes.add(sim.state_hash())
+    assert len(hashes) == 1
+    assert sim.ledger.impacts > 0
+
+
+def test_a_ball_keeps_its_speed_along_what_it_rests_on():
+    """There is no friction: what slides on the floor, and on a body that lies there, goes on sliding."""
+    slab = listed({"kind": "box", "edges": [4.0, 4.0, 0.5]}, {"position": (0, 0, -1.75)})
+    ball = listed("sphere", {"position": (-1, 0, -1.25), "velocity": (0.5, 0, 0)}, size=0.5)
+    sim, ledgers = followed(scene(slab, ball, size=(4, 4, 4), gravity=GRAVITY, restitution=0.5), 2, 10)
+    assert only_falls(ledgers)
+    assert np.allclose(sim.particles.velocity[1], (0.5, 0, 0), rtol=0, atol=1e-6)
+    assert sim.particles.position[1, 0] == pytest.approx(0.0, abs=1e-6)
