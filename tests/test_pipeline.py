@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from tests.worlds import gas, listed, scene
+from tests.worlds import gas, listed, quick_twin, scene
 
 SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))
 SMALL = {"movie": {"fps": 10.0, "resolution": [320, 180]}, "duration": 0.5}
@@ -15,8 +15,7 @@ SMALL = {"movie": {"fps": 10.0, "resolution": [320, 180]}, "duration": 0.5}
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda p: p.stem)
 def test_every_scene_runs(path):
-    loaded = ps.load_scene(path)
-    sim = ps.Simulation(loaded)
+    sim = ps.Simulation(quick_twin(path))
     before = sim.ledger
     sim.run(steps=10)
     after = sim.ledger

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from particlesim.scene import Scene
+from particlesim.scene.change import scaled
+from particlesim.scene.file import load_scene
+
+# A scene of more particles than this is tested by a twin with as many.
+MOST = 4000
 
 
 def listed(shape: Any, *poses: dict[str, Any], **group: Any) -> dict[str, Any]:
@@ -26,3 +32,9 @@ def gas(count: int = 20, *, seed: int = 1, **settings: Any) -> Scene:
     motion = {"velocity": {"kind": "maxwell", "temperature": 20.0}, "spin": {"kind": "maxwell", "temperature": 20.0}}
     groups = [{"shape": shape, "count": count, "size": 0.3, **motion} for shape in shapes]
     return scene(*groups, **{"size": (2.5, 2.5, 2.5), "seed": seed, **settings})
+
+
+def quick_twin(path: Path) -> Scene:
+    """The scene of a file, with fewer and larger particles if it has very many."""
+    loaded = load_scene(path)
+    return loaded if loaded.number <= MOST else scaled(loaded, MOST / loaded.number)
