@@ -12,8 +12,8 @@ from particlesim.crew import Crew
 from particlesim.jit import kernel
 
 # Steps of brightness (0 .. 255) below both of these are no edges: the least, and the share of the brightest about.
-_DIM = 10.0
-_STEEP = 0.07
+_DIM = np.float32(10.0)
+_STEEP = np.float32(0.07)
 
 # How far along an edge its end is looked for [pixels].
 _FARTHEST = 16
@@ -28,57 +28,84 @@ def smooth_edges(image: np.ndarray) -> np.ndarray:
     OpenGL's first row is the lowest, that of the result the highest; the fourth channel is left out.
     """
     height, width = image.shape[:2]
-    bright = np.empty((height, width), dtype=np.float32)
+    # A rim as bright as what it surrounds, for the neighbours of the pixels there.
+    bright = np.empty((height + 2, width + 2), dtype=np.float32)
     smooth = np.empty((height, width, 3), dtype=np.uint8)
     crew = Crew(height * width)
-    crew.each(lambda _, first, last: _brightness(image, bright, first, last), height)
+    crew.each(lambda _, first, last: _brightness(image, bright, smooth, first, last), height)
+    bright[0], bright[-1] = bright[1], bright[-2]
     crew.each(lambda _, first, last: _smooth(image, bright, smooth, first, last), height)
     return smooth
 
 
 @kernel
-def _brightness(image, bright, first, last):
-    """Brightness as the eye has it: green most, blue least (ITU-R BT.601)."""
+def _brightness(image, bright, smooth, first, last):
+    """Copy the colours, and work out brightness as the eye has it: green most, blue least (ITU-R BT.601)."""
+    height, width = image.shape[0], image.shape[1]
     for row in range(first, last):
-        for column in range(image.shape[1]):
+        out = height - 1 - row
+        for column in range(width):
             red, green, blue = image[row, column, 0], image[row, column, 1], image[row, column, 2]
-            bright[row, column] = np.float32(0.299) * red + np.float32(0.587) * green + np.float32(0.114) * blue
+            smooth[out, column, 0], smooth[out, column, 1], smooth[out, column, 2] = red, green, blue
+            bright[row + 1, column + 1] = (
+                np.float32(0.299) * np.float32(red)
+                + np.float32(0.587) * np.float32(green)
+                + np.float32(0.114) * np.float32(blue)
+            )
+        bright[row + 1, 0], bright[row + 1, width + 1] = bright[row + 1, 1], bright[row + 1, width]
+
+
+@kernel
+def _contrast(bright, row, contrast):
+    """How far the brightness about each pixel of a row goes beyond that of no edge; below 0 where there is none."""
+    for column in range(len(contrast)):
+        here = bright[row, column + 1]
+        n, s, e, w = (
+            bright[row + 1, column + 1],
+            bright[row - 1, column + 1],
+            bright[row, column + 2],
+            bright[row, column],
+        )
+        most = max(here, n, s, e, w)
+        contrast[column] = most - min(here, n, s, e, w) - max(_DIM, _STEEP * most)
 
 
 @kernel
 def _smooth(image, bright, smooth, first, last):
-    height, width = bright.shape
+    height, width = image.shape[0], image.shape[1]
+    contrast = np.empty(width, dtype=np.float32)
     for row in range(first, last):
-        out = height - 1 - row
-        above, below = min(row + 1, height - 1), max(row - 1, 0)
+        _contrast(bright, row + 1, contrast)
         for column in range(width):
-            right, left = min(column + 1, width - 1), max(column - 1, 0)
-            here = bright[row, column]
-            n, s, e, w = bright[above, column], bright[below, column], bright[row, right], bright[row, left]
-            most = max(here, n, s, e, w)
-            least = min(here, n, s, e, w)
-            share, across, down = 0.0, column, row
-            if most - least > max(_DIM, _STEEP * most):
-                ne, nw, se, sw = bright[above, right], bright[above, left], bright[below, right], bright[below, left]
-                # The edge runs along the direction in which brightness bends less.
-                upright = abs(ne - 2.0 * e + se) + 2.0 * abs(n - 2.0 * here + s) + abs(nw - 2.0 * w + sw)
-                sideways = abs(ne - 2.0 * n + nw) + 2.0 * abs(e - 2.0 * here + w) + abs(se - 2.0 * s + sw)
-                if upright >= sideways:
-                    down = above if abs(n - here) >= abs(s - here) else below
-                    share = _share(bright, row, column, down, column, 0, 1)
-                else:
-                    across = right if abs(e - here) >= abs(w - here) else left
-                    share = _share(bright, row, column, row, across, 1, 0)
-                around = (2.0 * (n + s + e + w) + ne + nw + se + sw) / 12.0
-                sticks_out = min(abs(around - here) / (most - least), 1.0)
-                share = max(share, _SUBDUED * sticks_out * sticks_out)
-            if share == 0.0:
-                for channel in range(3):
-                    smooth[out, column, channel] = image[row, column, channel]
-            else:
+            if contrast[column] > 0.0:
+                share, down, across = _mixture(bright, row + 1, column + 1)
+                down, across = min(max(down - 1, 0), height - 1), min(max(across - 1, 0), width - 1)
                 for channel in range(3):
                     own, other = image[row, column, channel], image[down, across, channel]
-                    smooth[out, column, channel] = np.uint8(own + share * (float(other) - own) + 0.5)
+                    mixed = own + share * (float(other) - own) + 0.5
+                    smooth[height - 1 - row, column, channel] = np.uint8(mixed)
+
+
+@kernel
+def _mixture(bright, row, column):
+    """How much a pixel takes from the one across the edge, and where that is: row, column."""
+    here = bright[row, column]
+    n, s, e, w = bright[row + 1, column], bright[row - 1, column], bright[row, column + 1], bright[row, column - 1]
+    ne, nw = bright[row + 1, column + 1], bright[row + 1, column - 1]
+    se, sw = bright[row - 1, column + 1], bright[row - 1, column - 1]
+    # The edge runs along the direction in which brightness bends less.
+    upright = abs(ne - 2.0 * e + se) + 2.0 * abs(n - 2.0 * here + s) + abs(nw - 2.0 * w + sw)
+    sideways = abs(ne - 2.0 * n + nw) + 2.0 * abs(e - 2.0 * here + w) + abs(se - 2.0 * s + sw)
+    if upright >= sideways:
+        down, across = row + (1 if abs(n - here) >= abs(s - here) else -1), column
+        share = _share(bright, row, column, down, across, 0, 1)
+    else:
+        down, across = row, column + (1 if abs(e - here) >= abs(w - here) else -1)
+        share = _share(bright, row, column, down, across, 1, 0)
+    around = (2.0 * (n + s + e + w) + ne + nw + se + sw) / 12.0
+    most, least = max(here, n, s, e, w), min(here, n, s, e, w)
+    sticks_out = min(abs(around - here) / (most - least), 1.0)
+    return max(share, _SUBDUED * sticks_out * sticks_out), down, across
 
 
 @kernel

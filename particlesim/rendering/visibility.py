@@ -320,12 +320,51 @@ def _most(sides, facing, row, column, grown):
 
 
 @kernel
-def _reaches(sides, facing, count, row, column, grown, most):
-    """Whether a pixel sees a hull: whether the planes that turn away allow the closeness ``most`` there."""
-    for f in range(facing, count):
-        if sides[f, 0] * column + sides[f, 1] * row + sides[f, 2] - grown * sides[f, 3] > most:
-            return False
-    return True
+def _room(sides, facing, count, row, column, grown):
+    """By how much the planes of a hull leave room for it at a pixel, below 0 if it is not seen; and how that grows."""
+    most, least = np.inf, -np.inf
+    slope_most = slope_least = 0.0
+    for f in range(count):
+        q = sides[f, 0] * column + sides[f, 1] * row + sides[f, 2]
+        if f < facing:
+            q += grown * sides[f, 3]
+            if q < most:
+                most, slope_most = q, sides[f, 0]
+        else:
+            q -= grown * sides[f, 3]
+            if q > least:
+                least, slope_least = q, sides[f, 0]
+    return most - least, slope_most - slope_least
+
+
+@kernel
+def _border(sides, facing, count, row, column, end, grown):
+    """Where a row of pixels comes into a hull on its way from ``column`` to ``end``, or beyond that if it never does.
+
+    The room for the hull is concave along the row: the root of its slope is never beyond the border, and each planes'
+    corner is passed once.
+    """
+    way = 1.0 if end >= column else -1.0
+    for _ in range(count):
+        room, slope = _room(sides, facing, count, row, column, grown)
+        if room >= 0.0:
+            return column
+        if slope * way <= 0.0:
+            return end + way
+        column -= room / slope
+        if (column - end) * way > 0.0:
+            return column
+    return column
+
+
+@kernel
+def _seen_in_row(sides, facing, count, row, start, end, grown):
+    """The pixels ``start .. end`` of a row whose middles see a hull: the first, and one past the last."""
+    left = _border(sides, facing, count, row, float(start), end - 1.0, grown)
+    if left > end - 1.0:
+        return start, start
+    right = _border(sides, facing, count, row, end - 1.0, left, grown)
+    return math.ceil(left), math.floor(right) + 1
 
 
 @kernel
@@ -333,26 +372,34 @@ def _hull(sides, facing, count, box, close, owner):
     """Whether a hull may be seen; it hides what is behind it."""
     seen = False
     for row in range(box[0], box[1]):
-        for column in range(box[2], box[3]):
+        start, end = _seen_in_row(sides, facing, count, row, box[2], box[3], -_MOVED)
+        for column in range(start, end):
             most = _most(sides, facing, row, column, -_MOVED)
-            if close[row, column] < most and _reaches(sides, facing, count, row, column, -_MOVED, most):
+            if close[row, column] < most:
                 close[row, column] = most
                 owner[row, column] = -1
                 seen = True
-            elif not seen:
-                most = _most(sides, facing, row, column, _MOVED) * (1.0 + _ROUNDING)
-                seen = close[row, column] < most and _reaches(sides, facing, count, row, column, _MOVED, most)
-    return seen
+    return seen or _peeps_out(sides, facing, count, box, close)
+
+
+@kernel
+def _peeps_out(sides, facing, count, box, close):
+    """Whether any pixel might see a hull that is a little larger, and nearer, than it is."""
+    for row in range(box[0], box[1]):
+        start, end = _seen_in_row(sides, facing, count, row, box[2], box[3], _MOVED)
+        for column in range(start, end):
+            if close[row, column] < _most(sides, facing, row, column, _MOVED) * (1.0 + _ROUNDING):
+                return True
+    return False
 
 
 @kernel
 def _cast(sides, facing, count, box, close):
     """A hull in the light hides it from what is behind its rear."""
     for row in range(box[0], box[1]):
-        for column in range(box[2], box[3]):
-            most = _most(sides, facing, row, column, 0.0)
-            if close[row, column] < most and _reaches(sides, facing, count, row, column, 0.0, most):
-                rear = -np.inf
-                for f in range(facing, count):
-                    rear = max(rear, sides[f, 0] * column + sides[f, 1] * row + sides[f, 2])
-                close[row, column] = max(close[row, column], rear)
+        start, end = _seen_in_row(sides, facing, count, row, box[2], box[3], 0.0)
+        for column in range(start, end):
+            rear = -np.inf
+            for f in range(facing, count):
+                rear = max(rear, sides[f, 0] * column + sides[f, 1] * row + sides[f, 2])
+            close[row, column] = max(close[row, column], rear)
