@@ -20,8 +20,9 @@ from particlesim.rendering.overlay import Overlay
 from particlesim.rendering.quality import PRESETS
 from particlesim.rendering.sky import Sky
 from particlesim.rendering.smoothing import smooth_edges
+from particlesim.rendering.sphere_tracing import TILE
 from particlesim.rendering.surroundings import Surroundings
-from particlesim.rendering.visibility import TILE, look, renumber
+from particlesim.rendering.visibility import look, renumber
 from particlesim.scene import Scene
 from particlesim.trajectory import Frame, Header
 
