@@ -132,7 +132,7 @@ def _on_lattice(
         points, spacing = _round_lattice(lower, upper, count, lattice.spacing, room)
     elif count:
         points, spacing = lattice_points(lower, upper, count, lattice.spacing)
-    if len(points) < count:
+    if len(points) < count and lattice.spacing is not None:
         message = f"makes a lattice of {len(points):,} points here, for {count:,} particles"
         raise SceneError(message, f"particles[{g}].placement.spacing", lattice.spacing)
     if (room > spacing).any():
@@ -141,20 +141,27 @@ def _on_lattice(
             message = f"a lattice of so many points has a spacing of {spacing:.4g} m, but {span}"
             raise SceneError(message, f"particles[{g}].count", count)
         raise SceneError(f"too tight: {span}", f"particles[{g}].placement.spacing", lattice.spacing)
-    return points + random.uniform(-0.5, 0.5, points.shape) * (lattice.jitter * (spacing - room))
+    moved = points + random.uniform(-0.5, 0.5, points.shape) * (lattice.jitter * (spacing - room))
+    if _is_round(lattice.region):
+        outside = _from_middle(moved, lower + 0.5 * room, upper - 0.5 * room) > 1.0
+        moved[outside] = points[outside]
+    return moved
 
 
 def _round_lattice(
     lower: np.ndarray, upper: np.ndarray, count: int, spacing: float | None, room: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """As ``lattice_points``, but those nearest to the middle of an ellipsoid in a box; particles span ``room`` (3,)."""
+    """As ``lattice_points``, but those nearest to the middle of an ellipsoid in a box; particles span ``room`` (3,).
+
+    Without a spacing, fewer come back only if the last one tried is too tight for the particles.
+    """
     edges = upper - lower
     tried = spacing or float((np.pi / 6.0 * edges.prod() / count) ** (1.0 / 3.0))
     while True:
         points, _ = lattice_points(lower, upper, np.iinfo(np.int64).max, tried)
         distance = _from_middle(points, lower + 0.5 * room, upper - 0.5 * room)
         inside = np.argsort(distance, kind="stable")[: min(count, int(np.count_nonzero(distance <= 1.0)))]
-        if len(inside) == count or spacing is not None or tried < 0.5 * edges.min() / count:
+        if len(inside) == count or spacing is not None or (room > tried).any():
             return points[np.sort(inside)], tried
         tried *= 0.995
 
@@ -165,7 +172,8 @@ def _is_round(region: Region | None) -> bool:
 
 def _from_middle(points: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Distance of points (m, 3) from the middle of a box, 1 on the ellipsoid that just fits into it."""
-    half = np.maximum(0.5 * (upper - lower), np.finfo(float).tiny)
+    # One without room has its middle only; what is off it is far away, by a number that has a square.
+    half = np.maximum(0.5 * (upper - lower), 1e-100)
     return np.linalg.norm((points - 0.5 * (lower + upper)) / half, axis=-1)
 
 
@@ -173,10 +181,16 @@ def _centres(
     g: int, where: ClusterPlacement, lower: np.ndarray, upper: np.ndarray, random: np.random.Generator
 ) -> np.ndarray:
     """Centres of the clusters, (clusters, 3) [m]."""
+    is_round = _is_round(where.region)
+    if where.centres is None and is_round:
+        way = random.normal(size=(where.clusters or 1, 3))
+        way *= random.uniform(size=(len(way), 1)) ** (1.0 / 3.0) / np.linalg.norm(way, axis=1, keepdims=True)
+        return 0.5 * (lower + upper) + 0.5 * (upper - lower) * way
     if where.centres is None:
         return random.uniform(lower, upper, (where.clusters or 1, 3))
     for k, centre in enumerate(where.centres):
-        if (np.array(centre) < lower).any() or (np.array(centre) > upper).any():
+        outside = (np.array(centre) < lower).any() or (np.array(centre) > upper).any()
+        if outside or (is_round and _from_middle(np.array(centre), lower, upper) > 1.0):
             raise SceneError(
                 "lies outside of where its particles may be", f"particles[{g}].placement.centres[{k}]", centre
             )
@@ -212,15 +226,20 @@ class _Trials:
         if (lower > upper).any():
             raise SceneError("too large: there are particles wider than the region they are placed in", self._key)
         points = self._proposed(who, lower, upper)
+        is_round = _is_round(self._where.region)
         # What falls outside is drawn again, so that the blob is cut off rather than piled up at the wall.
         for _ in range(100):
             outside = ((points < lower) | (points > upper)).any(axis=1)
-            if _is_round(self._where.region):
+            if is_round:
                 outside |= _from_middle(points, lower, upper) > 1.0
             if not outside.any():
-                break
+                return points
             points[outside] = self._proposed(who[outside], lower[outside], upper[outside])
-        return np.clip(points, lower, upper)
+        points = np.clip(points, lower, upper)
+        if is_round:
+            middle = 0.5 * (lower + upper)
+            points = middle + (points - middle) / np.maximum(_from_middle(points, lower, upper), 1.0)[:, None]
+        return points
 
     def _proposed(self, who: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
         if isinstance(self._where, RandomPlacement):

@@ -145,6 +145,44 @@ def test_random_particles_stay_in_their_region():
     assert (position + 0.05 <= region["upper"]).all()
 
 
+LOWER, UPPER = np.array([-1.8, -0.5, -1.0]), np.array([0.2, 1.5, 0.0])
+ROUND = {"lower": LOWER.tolist(), "upper": UPPER.tolist(), "form": "ellipsoid"}
+
+
+@pytest.mark.parametrize("shape", ["sphere", "cube"])
+@pytest.mark.parametrize(
+    "placement",
+    [
+        {"kind": "random"},
+        {"kind": "lattice"},
+        {"kind": "lattice", "jitter": 1.0},
+        {"kind": "lattice", "spacing": 0.19, "jitter": 1.0},
+        {"kind": "cluster", "spread": 0.3, "clusters": 20},
+        {"kind": "cluster", "spread": 0.05, "centres": [[-0.8, 0.5, -0.5], [-0.8, 0.5, -0.005]]},
+    ],
+)
+def test_particles_keep_to_an_ellipsoid(shape, placement):
+    count, size = (150, 0.1) if placement["kind"] != "cluster" else (60, 0.02)
+    group = {"shape": shape, "count": count, "size": size, "placement": {**placement, "region": ROUND}}
+    made, again = built(group, seed=4), built(group, seed=4)
+    assert made.state.position.tobytes() == again.state.position.tobytes()
+    # Their middles keep to one that is smaller by what is the least from a middle to a face.
+    smaller = 0.5 * (UPPER - LOWER - size)
+    assert made.state.position.shape == (count, 3)
+    distance = np.linalg.norm((made.state.position - 0.5 * (LOWER + UPPER)) / smaller, axis=1)
+    assert distance.max() <= 1.0 + 1e-12
+    # They fill it, and not the middle of it alone.
+    assert placement["kind"] == "cluster" or distance.max() > 0.85
+    assert shape == "cube" or deepest_overlap_of_spheres(made.state.position, made.constants.size) < 1e-12
+
+
+def test_few_particles_are_spread_evenly_in_an_ellipsoid():
+    group = spheres(3000, 1e-4, placement={"kind": "random", "region": ROUND})
+    inside = (built(group).state.position - 0.5 * (LOWER + UPPER)) / (0.5 * (UPPER - LOWER))
+    assert kstest(np.linalg.norm(inside, axis=1) ** 3, "uniform").pvalue > 0.01
+    assert np.abs(inside.mean(axis=0)).max() < 5.0 * math.sqrt(0.2 / 3000.0)
+
+
 def test_few_random_particles_are_spread_evenly():
     position = built(spheres(4000, 1e-4)).state.position
     for axis in range(3):

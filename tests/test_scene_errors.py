@@ -46,6 +46,9 @@ def path_of(*keys):
     return GOOD + f'[camera]\nkind = "path"\nkeys = [{", ".join(keys)}]\n'
 
 
+NARROW = "lower = [0, 0, 0], upper = [0.1, 1, 1]"
+ROUND = 'lower = [-0.5, -0.5, -0.5], upper = [0.5, 0.5, 0.5], form = "ellipsoid"'
+
 BROKEN = [
     ("", "the file is empty"),
     ("[world\n", "not valid TOML: Expected ']' at the end of a table declaration (at line 1, column 7)"),
@@ -255,6 +258,32 @@ BROKEN = [
     (
         group(count="10000", placement='"lattice"'),
         "particles[0].count = 10000: a lattice of so many points has a spacing of 0.1818 m, but the particles span 0.2 m",
+    ),
+    # Ellipsoids.
+    (
+        group(placement=f'{{ kind = "random", region = {{ {NARROW}, form = "round" }} }}'),
+        'particles[0].placement.region.form = "round": is not allowed here',
+    ),
+    (
+        group(placement=f'{{ kind = "random", region = {{ {NARROW}, form = "ellipsoid" }} }}'),
+        "particles[0].size: too large: there are particles wider than the region they are placed in",
+    ),
+    (
+        group(count="1000", placement=f'{{ kind = "lattice", region = {{ {NARROW}, form = "ellipsoid" }} }}'),
+        "particles[0].count = 1000: a lattice of so many points has a spacing of 0.03741 m, "
+        "but the particles span 0.2 m",
+    ),
+    (
+        group(placement=f'{{ kind = "lattice", spacing = 0.9, region = {{ {ROUND} }} }}'),
+        "particles[0].placement.spacing = 0.9: makes a lattice of 1 points here, for 10 particles",
+    ),
+    (
+        group(count="60", placement=f'{{ kind = "random", region = {{ {ROUND} }} }}'),
+        "particles[0].count = 60: no room for 23 of them at random: fewer or smaller particles, more room, or a lattice",
+    ),
+    (
+        group(placement=f'{{ kind = "cluster", spread = 1, centres = [[0.4, 0.4, 0.4]], region = {{ {ROUND} }} }}'),
+        "particles[0].placement.centres[0] = [0.4, 0.4, 0.4]: lies outside of where its particles may be",
     ),
     (
         world(size="[0.3, 4, 4]", boundary='"periodic"'),

@@ -11,7 +11,8 @@ from particlesim.jit import kernel
 # The shade is told at points a particle's radius apart, and at most at so many along the floor's longer side.
 _POINTS = 192
 
-# Particles whose middle is at most so many of their radii above the floor are looked at.
+# Particles whose middle is at most so many of their radii above the floor are looked at. Over the last of these radii
+# their shade fades to nothing: it would blink as they fall.
 _HIGHEST = 3.0
 
 # Farther than so many heights, a sphere hides less than a fiftieth of what it hides below itself.
@@ -55,7 +56,7 @@ def _shade(place, height, radius, size, light):
     for k in range(len(place)):
         h = height[k]
         x, y, reach = place[k, 0], place[k, 1], _REACH * h
-        share = (radius[k] / h) ** 2
+        share = (radius[k] / h) ** 2 * min(_HIGHEST - h / radius[k], 1.0)
         for row in range(max(0, math.ceil((y - reach) * along - 0.5)), min(rows, math.ceil((y + reach) * along))):
             b = ((row + 0.5) / along - y) / h
             for column in range(

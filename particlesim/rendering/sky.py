@@ -64,12 +64,17 @@ def _spread(position, depth, first, cell, step, fog):
             (position[i, 2] - first[2]) / cell,
         )
         a, b, c = math.floor(x), math.floor(y), math.floor(z)
-        if 0 <= a < fog.shape[0] - 1 and 0 <= b < fog.shape[1] - 1 and 0 <= c < fog.shape[2] - 1:
-            x, y, z = x - a, y - b, z - c
-            for corner in range(8):
-                right, up, high = corner & 1, corner >> 1 & 1, corner >> 2
+        x, y, z = x - a, y - b, z - c
+        for corner in range(8):
+            right, up, high = corner & 1, corner >> 1 & 1, corner >> 2
+            if _within(fog, a + right, b + up, c + high):
                 share = (x if right else 1.0 - x) * (y if up else 1.0 - y) * (z if high else 1.0 - z)
                 fog[a + right, b + up, c + high] += share * step * depth[i]
+
+
+@kernel
+def _within(cells, a, b, c):
+    return 0 <= a < cells.shape[0] and 0 <= b < cells.shape[1] and 0 <= c < cells.shape[2]
 
 
 @kernel
@@ -92,7 +97,7 @@ def _shine(fog, dx, dy, dz, weight, light):
 @kernel
 def _gather(position, depth, first, cell, light, members):
     """The light at each member's place, without the shadow of its own."""
-    out = np.ones(len(members))
+    out = np.empty(len(members))
     for k in range(len(members)):
         i = members[k]
         x, y, z = (
@@ -101,12 +106,13 @@ def _gather(position, depth, first, cell, light, members):
             (position[i, 2] - first[2]) / cell,
         )
         a, b, c = math.floor(x), math.floor(y), math.floor(z)
-        if 0 <= a < light.shape[0] - 1 and 0 <= b < light.shape[1] - 1 and 0 <= c < light.shape[2] - 1:
-            x, y, z = x - a, y - b, z - c
-            here = 0.0
-            for corner in range(8):
-                right, up, high = corner & 1, corner >> 1 & 1, corner >> 2
-                share = (x if right else 1.0 - x) * (y if up else 1.0 - y) * (z if high else 1.0 - z)
-                here += share * light[a + right, b + up, c + high]
-            out[k] = min(here * math.exp(_OWN * depth[i]), 1.0)
+        x, y, z = x - a, y - b, z - c
+        here = 0.0
+        for corner in range(8):
+            right, up, high = corner & 1, corner >> 1 & 1, corner >> 2
+            share = (x if right else 1.0 - x) * (y if up else 1.0 - y) * (z if high else 1.0 - z)
+            # Outside all is light: what flies out of an open world comes into it within a cell, not at once.
+            there = _within(light, a + right, b + up, c + high)
+            here += share * (light[a + right, b + up, c + high] if there else 1.0)
+        out[k] = min(here * math.exp(_OWN * depth[i]), 1.0)
     return out

@@ -1,0 +1,117 @@
+"""Who sees what, told ray by ray: an independent answer to the questions of ``particlesim.rendering.visibility``."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from particlesim import shapes
+from particlesim.constants import SPHERE
+from particlesim.rendering.bodies import bodies_of
+from particlesim.rendering.outlook import Outlook
+from particlesim.trajectory import Header
+
+KINDS = shapes.sphere(), shapes.cube(), shapes.pyramid()
+
+
+class Crowd(NamedTuple):
+    """Particles of KINDS: ``number`` (n,) of their kind, ``size`` (n,), ``position`` (n, 3), ``orientation`` (n, 4)."""
+
+    number: np.ndarray
+    size: np.ndarray
+    position: np.ndarray
+    orientation: np.ndarray
+
+    @property
+    def bodies(self):
+        """As ``look`` wants them."""
+        n = len(self.size)
+        return bodies_of(Header("", KINDS, self.number, self.size, self.number, np.ones(n), np.ones((n, 3))))
+
+    @property
+    def where(self):
+        """The other arguments that ``look`` wants."""
+        return self.bodies, self.position, self.orientation
+
+    def only(self, members):
+        """Some of them, in the order given."""
+        return Crowd(*(of_all[members] for of_all in self))
+
+
+def crowd(seed, count, edge, low, high, kinds=3):
+    """Particles of sizes ``low`` to ``high`` anywhere in a cube about the origin, turned at random."""
+    random = np.random.default_rng(seed)
+    turn = random.normal(size=(count, 4))
+    return Crowd(
+        np.arange(count) % kinds,
+        random.uniform(low, high, count),
+        random.uniform(-0.5 * edge, 0.5 * edge, (count, 3)),
+        turn / np.linalg.norm(turn, axis=1, keepdims=True),
+    )
+
+
+def outlook(eye, target=(0.0, 0.0, 0.0), parallel=False, scale=60.0, size=(83, 61), roll=0.3):
+    """One who looks from ``eye`` to ``target``, the head aside by an angle ``roll``."""
+    away = np.subtract(target, eye) / np.linalg.norm(np.subtract(target, eye))
+    right = np.cross(away, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    right = np.cos(roll) * right + np.sin(roll) * np.cross(right, away)
+    return Outlook(np.array([right, np.cross(right, away), away]), np.asarray(eye, float), parallel, scale, size)
+
+
+def rays(view, moved=(0.0, 0.0)):
+    """Start and way of the ray through each pixel, both (height, width, 3) along the view's axes, lowest row first."""
+    width, height = view.size
+    across = (np.arange(width) + 0.5 - moved[0] - 0.5 * width) / view.scale
+    up = (np.arange(height) + 0.5 - moved[1] - 0.5 * height) / view.scale
+    aside = np.zeros((height, width, 3))
+    aside[..., 0], aside[..., 1] = np.meshgrid(across, up)
+    ahead = np.broadcast_to([0.0, 0.0, 1.0], aside.shape)
+    return (aside, ahead) if view.parallel else (np.zeros_like(aside), aside + ahead)
+
+
+def distances(view, crowd, moved=(0.0, 0.0)):
+    """Distance along the axis (n, height, width) at which each particle is met, inf where not; see ``look``.
+
+    ``moved``: how far hulls are drawn aside [pixels]. In a perspective view those that reach beside the eye are not
+    met: nothing is hidden by them.
+    """
+    width, height = view.size
+    middle = (crowd.position - view.eye) @ view.axes.T
+    exact, aside = rays(view), rays(view, moved)
+    met = np.full((len(middle), height, width), np.inf)
+    for i, kind in enumerate(crowd.number):
+        shape, size = KINDS[kind], crowd.size[i]
+        if shape.kind == SPHERE:
+            met[i] = _ball(view, *exact, middle[i], 0.5 * size)
+        elif view.parallel or middle[i, 2] > shape.radius * size:
+            enter, leave = _hull(view, *aside, middle[i], shape, size, crowd.orientation[i])
+            met[i] = np.where(enter <= leave, leave if view.parallel else enter, np.inf)
+    return met
+
+
+def _ball(view, start, way, middle, radius):
+    if view.parallel:  # a disc
+        return np.where(((start - middle)[..., :2] ** 2).sum(axis=-1) <= radius**2, middle[2], np.inf)
+    if np.linalg.norm(middle) <= radius:  # none from within
+        return np.full(way.shape[:2], np.inf)
+    long = np.linalg.norm(way, axis=-1)
+    along = way @ middle / long
+    apart = middle - (along / long)[..., None] * way
+    half = radius**2 - (apart**2).sum(axis=-1)
+    return np.where((half >= 0.0) & (along > 0.0), (along - np.sqrt(np.maximum(half, 0.0))) / long, np.inf)
+
+
+def _hull(view, start, way, middle, shape, size, turn):
+    """Where rays pass into a hull and out of it: the half-spaces of its faces cut them off one by one."""
+    enter, leave = np.full(way.shape[:2], -np.inf), np.full(way.shape[:2], np.inf)
+    turned = Rotation.from_quat(np.roll(turn, -1)).as_matrix()
+    for normal, loop in zip(shape.face_normals, shape.faces, strict=True):
+        outward = view.axes @ turned @ normal
+        before = outward @ middle + size * (normal @ shape.vertices[loop[0]]) - start @ outward
+        into = way @ outward
+        with np.errstate(divide="ignore"):
+            cut = before / into
+        enter = np.where(into < 0.0, np.maximum(enter, cut), enter)
+        leave = np.where(into > 0.0, np.minimum(leave, cut), leave)
+    return enter, leave
