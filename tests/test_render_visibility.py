@@ -6,7 +6,8 @@ import pytest
 from particlesim.constants import SPHERE
 from particlesim.crew import use_threads
 from particlesim.rendering.lighting import key_light
-from particlesim.rendering.visibility import TILE, look, renumber
+from particlesim.rendering.sphere_tracing import TILE
+from particlesim.rendering.visibility import look, renumber
 from particlesim.shapes import cube, sphere
 from tests.sight import KINDS, Crowd, crowd, distances, outlook, rays
 from tests.test_render_picture import draw, edge, make_frame, make_scene

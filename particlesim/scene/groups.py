@@ -34,7 +34,7 @@ from particlesim.scene.base import (
     shorthand,
     whole,
 )
-from particlesim.scene.wording import hint, listed, must_be
+from particlesim.scene.wording import hint, listed, must_be, one_of
 
 
 class PlainShape(Model):
@@ -118,7 +118,7 @@ class Region(Model):
 
     lower: Vector
     upper: Vector
-    form: Literal["box", "ellipsoid"] = "box"
+    form: Annotated[Literal["box", "ellipsoid"], one_of("box", "ellipsoid")] = "box"
 
     @model_validator(mode="after")
     def _ordered(self) -> Region:
