@@ -262,7 +262,7 @@ BROKEN = [
     # Ellipsoids.
     (
         group(placement=f'{{ kind = "random", region = {{ {NARROW}, form = "round" }} }}'),
-        'particles[0].placement.region.form = "round": must be 'box' or 'ellipsoid'',
+        "particles[0].placement.region.form = \"round\": must be 'box' or 'ellipsoid'",
     ),
     (
         group(placement=f'{{ kind = "random", region = {{ {NARROW}, form = "ellipsoid" }} }}'),
