@@ -146,3 +146,33 @@ def test_an_empty_scene_and_a_lone_particle_run():
     lone = Simulation(scene({"shape": "cube", "count": 1, "velocity": [1, 0, 0], "size": 0.1}))
     lone.run(duration=0.1)
     assert lone.ledger.impacts == 0
+
+
+# Places [m] and velocities [m/s] of eleven spheres, found among the first 20 million impacts of a million of them.
+ELEVEN = (
+    (0.010766594, 0.546828255, -3.579573745, -1.404957232, 0.568453278, -0.971022715),
+    (0.016398085, 0.472718762, -3.563001977, -0.161957199, -0.373832953, 0.149059538),
+    (-0.012303476, 0.562457556, -3.604802485, -0.493098396, 0.273773719, -0.935881451),
+    (0.048809703, 0.533919546, -3.581744105, -1.680155602, 0.020981321, -0.008430488),
+    (0.013537833, 0.512894141, -3.561253059, 0.425202879, 0.854414362, -0.894216625),
+    (0.054167126, 0.528849694, -3.544362073, 0.173802254, -0.519210573, -0.35514066),
+    (-0.010313696, 0.579585285, -3.463676721, 0.385418691, 0.457141508, -0.08050498),
+    (0.030872899, 0.541684611, -3.509210703, -0.697748871, 0.114079839, -0.359534179),
+    (0.074622968, 0.503668418, -3.516078703, -0.511830534, 1.727517948, -0.778391625),
+    (0.062795468, 0.541147927, -3.451628521, -0.735054852, -0.177454649, -1.690975039),
+    (0.068170338, 0.528408529, -3.487638712, -1.400152514, 0.691562367, -1.063827016),
+)
+
+
+def test_who_is_deflected_no_more_is_compared_with_those_who_were_meanwhile():
+    # Sphere 3 would hit 4, but 0 knocks that away before. Meanwhile 5 was deflected, and meets 3 on its old path.
+    poses = [{"position": row[:3], "velocity": row[3:]} for row in ELEVEN]
+    world = scene(listed("sphere", *poses, size=0.0375), size=(10.0, 10.0, 8.0), boundary="open", step=0.0036)
+    whole, halves = Simulation(world), Simulation(world)
+    whole.step(0.0036)
+    halves.step(0.0018)
+    halves.step(0.0018)
+    for simulation in (whole, halves):
+        assert simulation.ledger.impacts == 7
+        assert simulation.ledger.largest_overlap == 0.0
+    assert np.abs(whole.particles.position - halves.particles.position).max() < 1e-12

@@ -152,7 +152,7 @@ class Flight:
                 log, left = self._run(islands, log, met, times, duration)
                 unfinished += left
             with self._spent_on("contacts"):
-                linked = self._missed(log, islands.member, first_piece, duration)
+                linked = self._missed(log, islands.member, first_piece, duration, again=rounds > 0)
                 touched.append(newly_touched(course.touched, linked))
             rounds += 1
         done = not len(linked) and (anyhow or not unfinished)
@@ -184,13 +184,14 @@ class Flight:
         log = extended(self._course, log, [piece for piece, _, _ in parts], [whose for _, whose, _ in parts])
         return log, sum(left for _, _, left in parts)
 
-    def _missed(self, log: Log, members: np.ndarray, first_piece: int, duration: float) -> np.ndarray:
+    def _missed(self, log: Log, members: np.ndarray, first_piece: int, duration: float, again: bool) -> np.ndarray:
         """Pairs (m, 2) of different islands that meet after all, of those whose pieces of path start there.
 
-        They are among the ``members`` of the islands that have just been carried through.
+        They are among the ``members`` of the islands that have just been carried through. Where that was done
+        ``again``, some of them may be deflected no more, and meet others on the paths that they are on instead.
         """
         course, where = self._course, self._where(log)
-        deflected = members[course.head[members] >= 0]
+        whom = members if again else members[course.head[members] >= 0]
         if not follow_paths(where, self._neighbours, self._ball, members, duration):
             # Longer leashes for those that went astray: nobody goes farther than at his greatest speed all the time.
             speed = np.linalg.norm(log.piece[:, 8:11], axis=1) + np.linalg.norm(self._world.gravity) * duration
@@ -198,9 +199,10 @@ class Flight:
             position = self._state.position.copy()
             deflected = np.flatnonzero(course.head >= 0)
             position[deflected] = log.piece[course.head[deflected], 1:4]
+            whom = np.union1d(deflected, members)
             self._meet_neighbours(position)
             first_piece = 0
-        return missed_meetings(where, self._neighbours, self._ball, deflected, first_piece, duration)
+        return missed_meetings(where, self._neighbours, self._ball, whom, first_piece, duration)
 
     def _book(self, total: np.ndarray, unfinished: int) -> None:
         """Add what the islands tallied, and what resting contacts bore to the counts."""
