@@ -41,8 +41,10 @@ class Resting:
         self._last_bounces = self._time_of_last_bounces()
         self.standing: np.ndarray = np.full(count, FREE, dtype=np.int64)  # of each particle in its cluster
         self._held = np.empty(0, dtype=np.int64)
-        self._seen = state.position.copy(), state.orientation.copy()
-        self._way = np.zeros(count)
+        # Without gravity nothing is held, and nothing need be remembered of anybody.
+        known = count if self._gravity else 0
+        self._seen = state.position[:known].copy(), state.orientation[:known].copy()
+        self._way = np.zeros(known)
         self._neighbours: Neighbours | None = None
         self._clearance = np.empty(0)
         self.wall_impulse: np.ndarray = np.zeros(6)  # of the last stretch [N s]
