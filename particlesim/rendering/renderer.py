@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 from typing import NamedTuple
 
@@ -51,6 +52,7 @@ class Renderer:
         self._bridge = bridge = platform.open_bridge(found)
         self._scene, self._header, self._first = scene, header, first
         self._settled: _Settled | None = None
+        self._beside = ThreadPoolExecutor(1)
         self._quality = quality = PRESETS[scene.movie.quality]
         self._size = scene.movie.size
         self._drawn_size = (quality.samples * self._size[0], quality.samples * self._size[1])
@@ -81,6 +83,7 @@ class Renderer:
 
     def close(self) -> None:
         """Give back the OpenGL context. The renderer is of no use afterwards."""
+        self._beside.shutdown()
         self._canvas.close()
 
     def draw(self, frame: Frame, cells: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None) -> np.ndarray:
@@ -90,11 +93,13 @@ class Renderer:
         """
         self._settled = settled = self._settled or self._settle(self._first or frame)
         view = view_at(self._scene, frame.time, self._size[0] / self._size[1], settled.subject)
+        # The light looks while the camera does: each leaves a core idle now and then.
+        shadow = self._beside.submit(self._shadow_map, frame)
         owner, spheres = self._put_particles(frame, settled.colours, view)
         self._put_lines(view, cells)
         picture = self._bridge.Picture(
             view_block=self._view_block(view),
-            shadow=self._shadow_map(frame),
+            shadow=shadow.result(),
             owner=owner,
             spheres=spheres,
             ground=np.ones((1, 1)) if self._ground is None else self._ground.light(frame.position),
