@@ -124,14 +124,18 @@ class Renderer:
         axes = view.pose[:3, :3].T * np.array([[1.0], [1.0], [-1.0]])
         outlook = Outlook(axes, view.pose[:3, 3], False, 0.5 * self._drawn_size[1] / slope, self._drawn_size)
         sight = look(outlook, self._bodies, *_places(frame))
-        for number, layer in self._hulls.items():
-            members = sight.hulls[self._header.shape[sight.hulls] == number]
-            pose = [frame.position[members], self._header.size[members, None], frame.orientation[members]]
-            layer.put(np.hstack([*pose, self._paint(frame, colours, members)]))
         self._spheres.put(TILE * np.argwhere(sight.tiles)[:, ::-1])
-        members = renumber(sight.owner, len(frame.position))
-        ball = np.column_stack([frame.position[members], self._bodies.outer[members]])
-        return sight.owner, np.hstack([ball, self._paint(frame, colours, members)], dtype=np.float32)
+        spheres = renumber(sight.owner, len(frame.position))
+        # Together, as the light of the sky is worked out for all places at once.
+        paint = self._paint(frame, colours, np.concatenate([sight.hulls, spheres]))
+        of_hulls, of_spheres = paint[: len(sight.hulls)], paint[len(sight.hulls) :]
+        for number, layer in self._hulls.items():
+            mine = self._header.shape[sight.hulls] == number
+            members = sight.hulls[mine]
+            pose = [frame.position[members], self._header.size[members, None], frame.orientation[members]]
+            layer.put(np.hstack([*pose, of_hulls[mine]]))
+        ball = np.column_stack([frame.position[spheres], self._bodies.outer[spheres]])
+        return sight.owner, np.hstack([ball, of_spheres], dtype=np.float32)
 
     def _paint(self, frame: Frame, colours: ParticleColours, members: np.ndarray) -> np.ndarray:
         """Linear colour, and share of the sky's light, of some particles, (k, 4) float64."""
