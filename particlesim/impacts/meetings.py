@@ -252,7 +252,7 @@ def missed_meetings(
 ) -> np.ndarray:
     """Pairs (m, 2) that particles ``whom`` make with others of other islands, whatever either has met meanwhile.
 
-    ``whom`` are all those whose pieces of path begin with ``first_piece`` or later.
+    ``whom`` has all those whose pieces of path begin with ``first_piece`` or later, and any whose pieces were undone.
     """
     _, world, _, _, course, _ = where
     arguments = course.island, course.head, first_piece, ball, world.period, neighbours.lists, whom

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from particlesim.jit import kernel
+from particlesim.vec import apply_transposed, matrix_of, row4, vector
 
 # OpenGL moves corners to places that it can tell apart, by at most 1/256 of a pixel: a hull hides only what is hidden
 # by it wherever within this [pixels] it is drawn, and is left out only if nobody saw it there.
@@ -23,25 +24,11 @@ ROUNDING = 1e-6
 @kernel
 def turned(axes, orientation, i):
     """The matrix from a particle's own axes to those of the one who looks, row by row."""
-    w, a, b, c = orientation[i, 0], orientation[i, 1], orientation[i, 2], orientation[i, 3]
-    r = (
-        (1.0 - 2.0 * (b * b + c * c), 2.0 * (a * b - w * c), 2.0 * (a * c + w * b)),
-        (2.0 * (a * b + w * c), 1.0 - 2.0 * (a * a + c * c), 2.0 * (b * c - w * a)),
-        (2.0 * (a * c - w * b), 2.0 * (b * c + w * a), 1.0 - 2.0 * (a * a + b * b)),
-    )
+    own = matrix_of(row4(orientation, i))
     return (
-        _combined(axes[0, 0], axes[0, 1], axes[0, 2], r),
-        _combined(axes[1, 0], axes[1, 1], axes[1, 2], r),
-        _combined(axes[2, 0], axes[2, 1], axes[2, 2], r),
-    )
-
-
-@kernel
-def _combined(a, b, c, r):
-    return (
-        a * r[0][0] + b * r[1][0] + c * r[2][0],
-        a * r[0][1] + b * r[1][1] + c * r[2][1],
-        a * r[0][2] + b * r[1][2] + c * r[2][2],
+        apply_transposed(own, vector(axes[0])),
+        apply_transposed(own, vector(axes[1])),
+        apply_transposed(own, vector(axes[2])),
     )
 
 

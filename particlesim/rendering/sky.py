@@ -55,20 +55,27 @@ class Sky:
 
 
 @kernel
+def _cell_of(position, first, cell, i):
+    """The lowest of the eight cells whose middles are about a particle, and its shares of low and high on each axis."""
+    x, y, z = (
+        (position[i, 0] - first[0]) / cell,
+        (position[i, 1] - first[1]) / cell,
+        (position[i, 2] - first[2]) / cell,
+    )
+    a, b, c = math.floor(x), math.floor(y), math.floor(z)
+    x, y, z = x - a, y - b, z - c
+    return (a, b, c), ((1.0 - x, x), (1.0 - y, y), (1.0 - z, z))
+
+
+@kernel
 def _spread(position, depth, first, cell, step, fog):
     """Share the optical depth of each ``step``-th particle, for all, between the eight cells that are about it."""
     for i in range(0, len(position), step):
-        x, y, z = (
-            (position[i, 0] - first[0]) / cell,
-            (position[i, 1] - first[1]) / cell,
-            (position[i, 2] - first[2]) / cell,
-        )
-        a, b, c = math.floor(x), math.floor(y), math.floor(z)
-        x, y, z = x - a, y - b, z - c
+        (a, b, c), shares = _cell_of(position, first, cell, i)
         for corner in range(8):
             right, up, high = corner & 1, corner >> 1 & 1, corner >> 2
             if _within(fog, a + right, b + up, c + high):
-                share = (x if right else 1.0 - x) * (y if up else 1.0 - y) * (z if high else 1.0 - z)
+                share = shares[0][right] * shares[1][up] * shares[2][high]
                 fog[a + right, b + up, c + high] += share * step * depth[i]
 
 
@@ -100,17 +107,11 @@ def _gather(position, depth, first, cell, light, members):
     out = np.empty(len(members))
     for k in range(len(members)):
         i = members[k]
-        x, y, z = (
-            (position[i, 0] - first[0]) / cell,
-            (position[i, 1] - first[1]) / cell,
-            (position[i, 2] - first[2]) / cell,
-        )
-        a, b, c = math.floor(x), math.floor(y), math.floor(z)
-        x, y, z = x - a, y - b, z - c
+        (a, b, c), shares = _cell_of(position, first, cell, i)
         here = 0.0
         for corner in range(8):
             right, up, high = corner & 1, corner >> 1 & 1, corner >> 2
-            share = (x if right else 1.0 - x) * (y if up else 1.0 - y) * (z if high else 1.0 - z)
+            share = shares[0][right] * shares[1][up] * shares[2][high]
             # Outside all is light: what flies out of an open world comes into it within a cell, not at once.
             there = _within(light, a + right, b + up, c + high)
             here += share * (light[a + right, b + up, c + high] if there else 1.0)
