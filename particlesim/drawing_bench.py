@@ -158,12 +158,12 @@ def own_pictures(drawn: Crowd) -> Iterator[np.ndarray]:
     n = len(drawn.size)
     kinds = tuple(CATALOGUE[shape]() for shape in drawn.shapes)
     header = Header("", kinds, drawn.number, drawn.size, drawn.number, np.ones(n), np.ones((n, 3)))
-    still, home = np.zeros((n, 3)), np.zeros((n, 3), dtype=np.int64)
+    still, home, unhurt = np.zeros((n, 3)), np.zeros((n, 3), dtype=np.int64), np.zeros(n, dtype=np.int64)
     with Renderer(scene, header) as renderer:
         k = 0
         while True:
             position = _moved(drawn, k)
-            yield renderer.draw(Frame(_TURN * k, position, drawn.orientation, drawn.velocity, still, home, {}))
+            yield renderer.draw(Frame(_TURN * k, position, drawn.orientation, drawn.velocity, still, home, unhurt, {}))
             k += 1
 
 

@@ -93,7 +93,12 @@ class Simulation:
     @property
     def particles(self) -> Particles:
         """Constants and state side by side (see Particles): views of the arrays, but for the angular velocity."""
-        return Particles(*self.constants, *self.state, angular_velocity=spins(self.constants, self.state))
+        return Particles(
+            *self.constants,
+            *self.state,
+            angular_velocity=spins(self.constants, self.state),
+            impacts=self._flight.counts.each,
+        )
 
     @property
     def ledger(self) -> Ledger:
@@ -142,6 +147,7 @@ class Simulation:
             velocity=state.velocity.copy(),
             angular_momentum=state.angular_momentum.copy(),
             image=state.image.copy(),
+            impacts=self._flight.counts.each.copy(),
             ledger=self.ledger.row(),
         )
 

@@ -55,6 +55,7 @@ class Particles(NamedTuple):
     angular_momentum: np.ndarray
     image: np.ndarray
     angular_velocity: np.ndarray  # (n, 3) world axes [rad/s], computed from the angular momentum
+    impacts: np.ndarray  # (n,) int64, how many each has had since the start
 
 
 class World(NamedTuple):

@@ -29,6 +29,9 @@ _MAX_SIZES = 64
 # GSD stores names of types in fixed-width fields and text as bytes.
 _LOG = "particlesim/"
 
+# Under this prefix OVITO finds quantities of the particles that the schema does not have.
+_IMPACTS = "particles/impacts"
+
 
 class TrajectoryError(ValueError):
     """A file that is not a trajectory of ours; the message is one line."""
@@ -58,7 +61,7 @@ class Frame:
 
     ``position`` (n, 3) [m], ``orientation`` (n, 4) quaternions (w, x, y, z) body to world, ``velocity`` (n, 3) [m/s],
     ``angular_momentum`` (n, 3) about the centroids, world axes [kg m^2/s], ``image`` (n, 3) turns round a periodic
-    world; ``ledger`` numbers and vectors by name (see Ledger).
+    world, ``impacts`` (n,) of each since the start; ``ledger`` numbers and vectors by name (see Ledger).
     """
 
     time: float
@@ -67,6 +70,7 @@ class Frame:
     velocity: np.ndarray
     angular_momentum: np.ndarray
     image: np.ndarray
+    impacts: np.ndarray
     ledger: dict[str, Any]
 
 
@@ -110,6 +114,7 @@ class TrajectoryWriter:
             particles.moment_inertia = header.inertia.astype(np.float32)
             particles.diameter = _display_diameters(header)
             out.log.update(_header_log(header))
+        out.log[_IMPACTS] = frame.impacts.astype(np.uint32)
         out.log[_LOG + "time"] = np.array([frame.time])
         for name, value in frame.ledger.items():
             out.log[f"{_LOG}ledger/{name}"] = np.atleast_1d(np.asarray(value))
@@ -170,6 +175,7 @@ class Trajectory:
             velocity=particles.velocity.astype(np.float64),
             angular_momentum=_world_momentum(particles.angmom.astype(np.float64), orientation),
             image=particles.image.astype(np.int64),
+            impacts=log[_IMPACTS].astype(np.int64),
             ledger=ledger,
         )
 

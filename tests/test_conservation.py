@@ -107,12 +107,15 @@ def test_a_second_opinion_on_the_first_sixty_impacts(step):
     sim = Simulation(scene(moving, size=(edge,) * 3, boundary="periodic", seed=5, step=step))
     p = sim.particles
     other = Spheres(p.position, p.velocity, p.mass, p.radius, edge)
+    impacts = np.zeros(26, dtype=int)
     for number in range(20, 61, 20):
         for _ in range(20):
-            last, _, _ = other.impact()
+            last, *both = other.impact()
+            impacts[both] += 1
         sim.run_until(last + 1e-9)
         other.run_until(last + 1e-9)
         assert sim.ledger.impacts == number
+        assert np.array_equal(sim.particles.impacts, impacts)
         assert np.allclose(sim.particles.position + edge * sim.particles.image, other.position, rtol=0, atol=1e-8)
         assert np.allclose(sim.particles.velocity, other.velocity, rtol=0, atol=1e-8)
 

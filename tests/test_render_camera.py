@@ -147,7 +147,7 @@ def header(size):
 def frame(position, velocity=None):
     position = np.asarray(position, dtype=float)
     velocity = np.zeros_like(position) if velocity is None else np.asarray(velocity, dtype=float)
-    return Frame(0.0, position, None, velocity, None, None, {})
+    return Frame(0.0, position, None, velocity, None, None, None, {})
 
 
 def open_scene(camera="fixed", boundary="open", **settings):

@@ -24,7 +24,7 @@ def frame(velocity, time=0.0, **ledger):
     velocity = np.asarray(velocity, dtype=float)
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(velocity), 1))
     zero = np.zeros_like(velocity)
-    return Frame(time, zero, turn, velocity, zero, zero.astype(int), ledger)
+    return Frame(time, zero, turn, velocity, zero, zero.astype(int), np.zeros(len(velocity), int), ledger)
 
 
 def scene(*colours, gravity=(0.0, 0.0, 0.0), boundary="wall", span=None):
@@ -98,6 +98,14 @@ def test_each_field_colours_its_own_groups():
     assert rgb[4] * 255 == pytest.approx([128, 64, 32], abs=1e-3)
 
 
+def test_impacts_colour_those_who_had_them():
+    quiet = frame(np.zeros((3, 3)))
+    colours = ParticleColours(scene("by_impacts", span=(0.0, 10.0)), header(["sphere"], [0, 0, 0]), quiet)
+    quiet.impacts[:] = 0, 5, 50
+    rgb = np.sqrt(of_all(colours, quiet))
+    assert rgb == pytest.approx(map_colours(np.array([0.0, 0.5, 1.0])), abs=2e-3)
+
+
 def test_scales_are_given_or_settled_by_the_first_frame():
     head = header(["sphere"], [0, 0])
     start = frame([[3.0, 0.0, 0.0], [0.0, 4.0, 0.0]])
@@ -113,6 +121,9 @@ def test_scales_are_given_or_settled_by_the_first_frame():
     assert scale("by_height") == (-2.0, 2.0)
     assert scale("by_height", boundary="open") == (7.0, 9.0)
     assert scale("by_size") == (0.5, 1.5)  # all are of size 1
+    # In 10 s at 3.5 m/s: two spheres of 1 m in 4 m^3; walls 1, 1 and 4 m apart.
+    assert scale("by_impacts", boundary="open") == (0.0, round(70.0 * np.sqrt(2.0) * np.pi * 2.0 / 4.0))
+    assert scale("by_impacts") == (0.0, round(70.0 * (np.sqrt(2.0) * np.pi * 2.0 / 4.0 + 2.25 / 2.0)))
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,8 @@ def make_header(count, group=None):
 def make_frame(count=1, time=0.0, velocity=(0.0, 0.0, 0.0), **ledger):
     zero = np.zeros((count, 3))
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
-    return Frame(time, zero, turn, np.tile(np.asarray(velocity, float), (count, 1)), zero, zero.astype(int), ledger)
+    velocity = np.tile(np.asarray(velocity, float), (count, 1))
+    return Frame(time, zero, turn, velocity, zero, zero.astype(int), np.zeros(count, int), ledger)
 
 
 def make_scene(*groups, size=(1280, 720), world=None, **show):

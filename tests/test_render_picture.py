@@ -30,7 +30,7 @@ def make_frame(position, orientation=None):
     position = np.asarray(position, dtype=float)
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(position), 1)) if orientation is None else np.asarray(orientation)
     still = np.zeros_like(position)
-    return Frame(0.0, position, turn, still, still, still.astype(int), {})
+    return Frame(0.0, position, turn, still, still, still.astype(int), np.zeros(len(position), int), {})
 
 
 def make_header(shape_list, number, size):

@@ -19,7 +19,7 @@ scene = Scene(world={"size": (2, 2, 2)}, particles=[{"shape": "sphere", "count":
 header = Header("", (shapes.sphere(),), np.zeros(1, int), np.ones(1), np.zeros(1, int),
                 np.ones(1), np.ones((1, 3)))
 zero = np.zeros((1, 3))
-frame = Frame(0.0, zero, np.array([[1.0, 0, 0, 0]]), zero, zero, zero.astype(int), {})
+frame = Frame(0.0, zero, np.array([[1.0, 0, 0, 0]]), zero, zero, zero.astype(int), np.zeros(1, int), {})
 try:
     with Renderer(scene, header) as renderer:
         print(renderer.draw(frame).tobytes().hex())

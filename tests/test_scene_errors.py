@@ -15,7 +15,7 @@ COUNT = "must be a whole number from 0 to 100,000,000"
 SIZE = 'must be a number above 0, or a table such as { kind = "uniform", low = 0.1, high = 0.2 }'
 BOUNDARY = "must be 'wall', 'periodic' or 'open', or a list of 3 of them"
 TURN = "[w, x, y, z] (a quaternion), or { axis = [x, y, z], angle = degrees }"
-COLOUR = "must be 'by_shape', 'by_group', 'by_speed', 'by_height', 'by_size', a colour name such as 'steelblue', or '#rrggbb'"
+COLOUR = "must be 'by_shape', 'by_group', 'by_speed', 'by_height', 'by_size', 'by_impacts', a colour name such as 'steelblue', or '#rrggbb'"
 ROWS = (
     "must be true, false or a list of 'time', 'particles', 'impacts', 'energy change', 'temperature', 'pressure', "
     "'speed', 'pairs tested' or 'broad phases'"
@@ -201,7 +201,7 @@ BROKEN = [
     (group(colour='"by_speed"', colour_range="3"), f"particles[0].colour_range = 3: {RANGE}"),
     (
         group(colour_range="[0, 1]"),
-        "particles[0]: colour_range goes with the colours 'by_speed', 'by_height' or 'by_size'",
+        "particles[0]: colour_range goes with the colours 'by_speed', 'by_height', 'by_size' or 'by_impacts'",
     ),
     (
         group(colour='"by_size"', colour_range="[0, 1]") + GROUP + 'colour = "by_size"\ncolour_range = [0, 2]\n',

@@ -119,6 +119,26 @@ def test_the_ledger_counts():
     assert np.allclose(ledger.angular_momentum, orbital.sum(axis=0))
 
 
+def test_impacts_are_counted_for_each_particle():
+    """Balls in a row at unlike speeds: the first catches up with both, and each then reaches the wall alone."""
+    row = [{"position": (x, 0, 0), "velocity": (v, 0, 0)} for x, v in ((-8, 9), (-4, 3), (0, 1))]
+    sim = Simulation(scene(listed("sphere", *row), boundary="wall"))
+    # Equal masses exchange their speeds: impacts of 1 and 2, of 2 and 3, of 1 and 2, then 3 at the wall.
+    sim.run(duration=1.8)
+    assert sim.particles.impacts.tolist() == [2, 3, 2]
+    assert sim.frame().impacts.sum() == 2 * 3 + 1
+
+
+@pytest.mark.parametrize("shape", ["sphere", "cube"])
+def test_impacts_of_particles_add_up_to_those_of_the_ledger(shape):
+    """Also where islands are joined and run again, and where several meet at one moment."""
+    crowd = {"shape": shape, "count": 150, "size": 0.2, "velocity": {"kind": "maxwell", "temperature": 1.0}}
+    sim = Simulation(scene(crowd, size=(1.9, 1.9, 1.9), boundary="periodic", step=0.2))
+    sim.run(steps=20)
+    assert sim.ledger.impacts > 1000
+    assert sim.particles.impacts.sum() == 2 * sim.ledger.impacts
+
+
 def test_the_virial_of_one_impact():
     """r_ij . J of a head-on impact: the distance of the centres times the impulse."""
     a, b = {"position": (-2, 0, 0), "velocity": (1, 0, 0)}, {"position": (2, 0, 0), "velocity": (-1, 0, 0)}

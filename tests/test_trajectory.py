@@ -37,6 +37,7 @@ def test_what_is_written_is_read(run):
             for name in ("position", "orientation", "velocity", "angular_momentum"):
                 assert np.allclose(getattr(read, name), getattr(written, name), rtol=1e-6, atol=1e-5), name
             assert np.array_equal(read.image, written.image)
+            assert np.array_equal(read.impacts, written.impacts)
             assert read.ledger["impacts"] == written.ledger["impacts"]
             assert np.array_equal(read.ledger["momentum"], written.ledger["momentum"])
 

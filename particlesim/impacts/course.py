@@ -26,7 +26,8 @@ class Course(NamedTuple):
     """Of each particle within the present stretch; times count from its start."""
 
     clock: np.ndarray  # (n,) when the state describes it [s]
-    stamp: np.ndarray  # (n,) int64, impacts it has had
+    stamp: np.ndarray  # (n,) int64, how often its path was looked into anew
+    impacts: np.ndarray  # (n,) int64, impacts it has had
     head: np.ndarray  # (n,) int64, its first piece in the log, or NOTHING_MET
     tail: np.ndarray  # (n,) int64, its last piece
     island: np.ndarray  # (n,) int64, the smallest particle whose impacts hang together with its own
@@ -49,6 +50,7 @@ def new_course(count: int, gravity: np.ndarray) -> Course:
     return Course(
         clock=np.zeros(count),
         stamp=np.zeros(count, dtype=np.int64),
+        impacts=np.zeros(count, dtype=np.int64),
         head=np.full(count, NOTHING_MET, dtype=np.int64),
         tail=np.full(count, NOTHING_MET, dtype=np.int64),
         island=np.arange(count, dtype=np.int64),
@@ -131,7 +133,7 @@ def rewind(course, log, state, particles):
     """Take particles back to the start of the stretch, as if they had met nothing."""
     for i in particles:
         course.clock[i] = 0.0
-        course.stamp[i] = 0
+        course.stamp[i] = course.impacts[i] = 0
         if course.head[i] >= 0:
             position, turn, velocity, momentum, pull = path_of_piece(log.piece, course.head[i])
             put(state.position, i, position)
@@ -147,7 +149,7 @@ def forget(course, particles):
     """Let particles have met nothing, at the start of a new stretch."""
     for i in particles:
         course.clock[i] = 0.0
-        course.stamp[i] = 0
+        course.stamp[i] = course.impacts[i] = 0
         course.head[i] = NOTHING_MET
         course.island[i] = course.ring[i] = i
         course.touched[i] = False

@@ -238,6 +238,7 @@ def run_islands(
                 whom,
                 size,
                 slow_left <= 0,
+                course.impacts,
                 tally[members[0]],
             )
             slow_left -= outcome != STRUCK

@@ -47,6 +47,7 @@ PHASES = ("pairs", "contacts", "respond", "advance")
 class Counts:
     """What was done since the start."""
 
+    each: np.ndarray  # (n,) int64, impacts of each particle
     impacts: int = 0
     virial: float = 0.0  # sum of r_ij . impulse over pair impacts [J s]
     wall_impulse: np.ndarray = field(default_factory=lambda: np.zeros(6))  # outward, on each wall [N s]
@@ -69,7 +70,7 @@ class Flight:
         self._first_met = np.full(count, -1, dtype=np.int64)
         self._tally = np.zeros((count, TALLY if (world.boundary == WALL).any() else WALLS))
         self._resting = Resting(table, world, constants, state)
-        self.counts = Counts()
+        self.counts = Counts(np.zeros(count, dtype=np.int64))
         self.seconds = dict.fromkeys(PHASES, 0.0)
         self._ball = np.empty((count, 8))  # by place, what each particle cannot leave in the present stretch
         self._looked = 0  # how often neighbours were looked up
@@ -159,7 +160,7 @@ class Flight:
         everyone = np.concatenate(touched)
         tallied = add_up(self._tally, course.island, everyone)
         if done:
-            self._book(tallied, unfinished)
+            self._book(tallied, everyone, unfinished)
             with self._spent_on("advance"):
                 self._fly_on(duration)
         else:
@@ -204,8 +205,9 @@ class Flight:
             first_piece = 0
         return missed_meetings(where, self._neighbours, self._ball, whom, first_piece, duration)
 
-    def _book(self, total: np.ndarray, unfinished: int) -> None:
+    def _book(self, total: np.ndarray, touched: np.ndarray, unfinished: int) -> None:
         """Add what the islands tallied, and what resting contacts bore to the counts."""
+        self.counts.each[touched] += self._course.impacts[touched]
         self.counts.impacts += int(total[IMPACTS])
         self.counts.virial += float(total[VIRIAL]) + self._resting.virial
         self.counts.wall_impulse[: len(total) - WALLS] += total[WALLS:]

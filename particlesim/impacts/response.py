@@ -182,11 +182,12 @@ def _bounce(world, constants, state, acceleration, i, j, speed):
 
 
 @kernel
-def answer(table, world, constants, state, acceleration, contacts, count, whom, size, leave_slow, tally):
+def answer(table, world, constants, state, acceleration, contacts, count, whom, size, leave_slow, struck, tally):
     """Answer ``count`` contacts (particle, partner) of one moment until nothing in them approaches.
 
     ``whom`` lists the ``size`` particles in them; with ``leave_slow`` those that may come to rest are left to
-    the next stretch of time. Adds to ``tally`` and returns what came of it: NOTHING if nothing approached, else
+    the next stretch of time. Adds to ``tally``, and 1 for each contact to both its particles' rows of ``struck`` (n,),
+    and returns what came of it: NOTHING if nothing approached, else
     STRUCK if that happened anywhere, or REBOUNDED.
     """
     points = np.empty((count, MAX_MANIFOLD, 3))
@@ -243,8 +244,10 @@ def answer(table, world, constants, state, acceleration, contacts, count, whom, 
             if impulse[c] > 0.0:
                 answered[c] = True
                 _tell(tally, contacts[c, 1], factor * impulse[c], row(offsets, c), row(normals, c))
-    impacts = 0
     for c in range(count):
-        impacts += answered[c]
-    tally[IMPACTS] += impacts
+        if answered[c]:
+            tally[IMPACTS] += 1
+            for i in contacts[c]:
+                if i >= 0:
+                    struck[i] += 1
     return outcome

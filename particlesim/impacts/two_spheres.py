@@ -67,7 +67,7 @@ def _enter(state, course, piece, particle, index, i, time, after):
     put(state.angular_momentum, i, momentum)
     write_piece(piece, index + 1, time, state, course.acceleration, i)
     particle[index, 0] = particle[index + 1, 0] = i
-    course.head[i], course.clock[i], course.stamp[i] = UNCHAINED, time, 1
+    course.head[i], course.clock[i], course.stamp[i], course.impacts[i] = UNCHAINED, time, 1, 1
 
 
 @kernel

@@ -93,9 +93,29 @@ def _size_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, floa
     return (float(header.size.min()), float(header.size.max())) if len(header.size) else (0.0, 1.0)
 
 
+def _impacts(header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
+    return frame.impacts[members]
+
+
+def _impact_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, float]:
+    """From none to twice as many as a particle of a gas at the first speeds has had on average when the movie ends.
+
+    It meets others at a rate of sqrt(2) pi d^2 n v, and walls of area A around a volume V at A v / 4 V (J. Jeans, An
+    Introduction to the Kinetic Theory of Gases, 1940, ch. 2 and 5).
+    """
+    edges = np.asarray(scene.world.size)
+    volume = float(edges.prod())
+    speed = float(np.linalg.norm(first.velocity, axis=1).mean()) if len(first.velocity) else 0.0
+    cross_section = math.pi * float(np.mean(header.size**2)) if len(header.size) else 0.0
+    walls = np.array([boundary == "wall" for boundary in scene.world.boundary])
+    rate = math.sqrt(2.0) * cross_section * len(header.size) / volume + 0.5 * float((walls / edges).sum())
+    return 0.0, max(1.0, round(2.0 * rate * speed * scene.duration))
+
+
 # Name, unit, values and scale of each. Sizes are factors on shapes of 1 m, hence metres.
 _FIELDS = {
     "by_speed": ("speed", "m/s", _speeds, _speed_scale),
     "by_height": ("height", "m", _heights, _height_scale),
     "by_size": ("size", "m", _sizes, _size_scale),
+    "by_impacts": ("impacts", "", _impacts, _impact_scale),
 }

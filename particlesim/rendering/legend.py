@@ -65,7 +65,7 @@ def _scale_panel(field: Field, style: Style) -> Panel:
     em, pad = style.em, style.pad
     width, bar, mark = round(_SCALE * em), round(_BAR * em), max(2, round(_MARK * em))
     panel = Panel(style, 2 * style.line + bar + mark + 2 * pad, width + 2 * pad)
-    panel.write(f"{field.name} [{field.unit}]", pad, pad, faint=True)
+    panel.write(f"{field.name} [{field.unit}]" if field.unit else field.name, pad, pad, faint=True)
     top = pad + style.line
     colours = 255.0 * map_colours(np.linspace(0.0, 1.0, width))
     panel.fill(np.tile(colours, (bar, 1, 1)), pad, top)

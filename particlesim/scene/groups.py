@@ -293,7 +293,7 @@ Spin = Annotated[_Spins, _or_vector(_Spins)]
 
 
 # Colours that stand for a quantity.
-FIELDS = "by_speed", "by_height", "by_size"
+FIELDS = "by_speed", "by_height", "by_size", "by_impacts"
 
 
 def _rising(value: tuple[float, float]) -> tuple[float, float]:
