@@ -98,7 +98,7 @@ def _impacts(header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
 
 
 def _impact_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, float]:
-    """From none to twice as many as a particle of a gas at the first speeds has had on average when the movie ends.
+    """From none to twice as many as a bounding sphere of a gas at the first speeds has had when the movie ends.
 
     It meets others at a rate of sqrt(2) pi d^2 n v, and walls of area A around a volume V at A v / 4 V (J. Jeans, An
     Introduction to the Kinetic Theory of Gases, 1940, ch. 2 and 5).
@@ -106,7 +106,8 @@ def _impact_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, fl
     edges = np.asarray(scene.world.size)
     volume = float(edges.prod())
     speed = float(np.linalg.norm(first.velocity, axis=1).mean()) if len(first.velocity) else 0.0
-    cross_section = math.pi * float(np.mean(header.size**2)) if len(header.size) else 0.0
+    radius = np.array([shape.radius for shape in header.shapes])[header.shape] * header.size
+    cross_section = math.pi * float(np.mean(4.0 * radius**2)) if len(radius) else 0.0
     walls = np.array([boundary == "wall" for boundary in scene.world.boundary])
     rate = math.sqrt(2.0) * cross_section * len(header.size) / volume + 0.5 * float((walls / edges).sum())
     return 0.0, max(1.0, round(2.0 * rate * speed * scene.duration))
