@@ -12,12 +12,14 @@ OPEN = 2
 # The six walls in the order of the ledger's wall impulses.
 WALL_NAMES = ("-x", "+x", "-y", "+y", "-z", "+z")
 
-# In an automatic time step the surfaces of particles move by this fraction of their bounding radii on average. It
-# decides how often neighbours are looked up and how much hangs together, not what happens: impacts have own times.
-STEP_FRACTION = 0.1
+# In an automatic time step the surfaces of particles move by this fraction of their bounding radii, as a root mean
+# square. It decides how often neighbours are looked up and how much hangs together, not what happens: impacts have own
+# times. Gases take about as long with anything from half of it to three times as much; a fast ball that strikes a
+# million at rest takes the least time if its particles move by two fifths of their radius, which this comes to.
+STEP_FRACTION = 0.125
 
 # A time step in which they would move farther than this is taken in several stretches.
-LONGEST_STRETCH = 0.25
+LONGEST_STRETCH = 0.4
 
 # Two faces, or an edge and a face, closer to parallel than this touch along a patch, not at a point [sine of the
 # angle].  Rounding turns a face by about 1e-15; a fall of one radius at this angle shifts the contact by 1e-6 of it.

@@ -298,8 +298,8 @@ def test_a_ball_knocked_far_off_is_followed_while_others_meet_unforeseen():
         {"position": (2, 50.6, 0)},
         {"position": (2.96, 51.32, 0)},
     ]
-    # The mean speed says how long a stretch may be: these hardly have any.
-    resting = [{"position": (3.0 * k, 0, -40)} for k in range(-60, 60)]
+    # The root mean square speed says how long a stretch may be: these have none.
+    resting = [{"position": (3.0 * (k % 60), 3.0 * (k // 60), -40)} for k in range(3000)]
     balls = listed("sphere", *aside, *resting, mass=1.0)
     sim = Simulation(scene(heavy, far, balls, size=(400, 400, 400), boundary="open", step=0.09))
     assert sim._flight.longest_stretch(LONGEST_STRETCH) > 0.09

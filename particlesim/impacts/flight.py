@@ -83,10 +83,11 @@ class Flight:
         return pairs_of(self._neighbours)
 
     def longest_stretch(self, fraction: float) -> float:
-        """In how long [s] the surfaces move by ``fraction`` of the bounding radius on average; inf if never.
+        """In how long [s] the surfaces move by ``fraction`` of the bounding radius (root mean square); inf if never.
 
-        The surface of a particle moves at most (|v| + |w| R) t + g t^2 / 2. On periodic axes nothing goes so
-        far that it could meet another image of a particle than the nearest.
+        Where few are fast among many at rest, it is they who meet others. The surface of a particle moves at most
+        (|v| + |w| R) t + g t^2 / 2. On periodic axes nothing goes so far that it could meet another image of a
+        particle than the nearest.
         """
         count = len(self._constants.mass)
         if not count:
@@ -96,8 +97,8 @@ class Flight:
             lambda _, first, last: paces(self._constants, self._state, self._world, sums, _ROWS, first, last), len(sums)
         )
         fastest = max(of_blocks)
-        pace, pull = sums.sum(axis=0) / count
-        time = _time_for(fraction, pace, pull)
+        square, pull = sums.sum(axis=0) / count
+        time = _time_for(fraction, math.sqrt(square), pull)
         time = min(time, self._resting.longest_stretch)
         around = self._world.period[self._world.period > 0.0]
         if len(around):

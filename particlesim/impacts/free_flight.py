@@ -68,9 +68,9 @@ def fly_on(constants, state, world, clock, acceleration, anchor, leash, duration
 
 @kernel
 def paces(constants, state, world, out, rows, first, last):
-    """Sums over blocks ``first .. last`` of ``rows`` particles: how fast surfaces move, and gravity pulls, in radii.
+    """Sums over blocks ``first .. last`` of ``rows`` particles: squares of paces of surfaces, and gravity, in radii.
 
-    ``out`` (blocks, 2) [1/s], [1/s^2]. Returns the largest speed [m/s].
+    ``out`` (blocks, 2) [1/s^2], [1/s^2]. Returns the largest speed [m/s].
     """
     velocity, orientation, momentum, inertia, radius = borrowed(
         (state.velocity, state.orientation, state.angular_momentum, constants.inertia, constants.radius)
@@ -86,7 +86,7 @@ def paces(constants, state, world, out, rows, first, last):
             speed = math.sqrt(speed2)
             if dot(own, own) > 0.0:
                 speed += norm(spin_of(row4(orientation, i), own, row(inertia, i))) * radius[i]
-            pace += speed / radius[i]
+            pace += (speed / radius[i]) ** 2
             pull += g / radius[i]
         out[block, 0], out[block, 1] = pace, pull
     return math.sqrt(fastest)
