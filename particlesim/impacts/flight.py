@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from particlesim.constants import LONGEST_STRETCH, MAX_HALVINGS, MAX_ROUNDS, WALL
+from particlesim.constants import LONGEST_STRETCH, MAX_HALVINGS, MAX_ROUNDS, SPHERE, WALL
 from particlesim.crew import Crew
 from particlesim.impacts.course import Log, empty_log, extended, forget, new_course, rewind
 from particlesim.impacts.event_loop import run_islands
@@ -65,6 +65,7 @@ class Flight:
         count = len(constants.mass)
         self._table, self._world, self._constants, self._state = table, world, constants, state
         self._find_pairs = find_pairs
+        self._hulls = bool((table.kind[constants.shape] != SPHERE).any())
         self._course = new_course(count, world.gravity)
         self._leash = np.empty(count)
         self._first_met = np.full(count, -1, dtype=np.int64)
@@ -124,6 +125,7 @@ class Flight:
     def _stretch(self, duration: float, halvings: int = 0) -> None:
         if duration > self._on_leash:
             with self._spent_on("pairs"):
+                del self._neighbours  # which take as much memory as what it takes to make new ones
                 self._look_around(duration)
         if not self._follow(duration, halvings == MAX_HALVINGS):
             # Too much hangs together, or happens: less does in half the time.
@@ -202,6 +204,7 @@ class Flight:
             deflected = np.flatnonzero(course.head >= 0)
             position[deflected] = log.piece[course.head[deflected], 1:4]
             whom = np.union1d(deflected, members)
+            del self._neighbours
             self._meet_neighbours(position)
             first_piece = 0
         return missed_meetings(where, self._neighbours, self._ball, whom, first_piece, duration)
@@ -247,7 +250,13 @@ class Flight:
 
     def _meet_neighbours(self, position: np.ndarray) -> None:
         self._neighbours, tested, candidates = find_neighbours(
-            position, self._constants.radius, self._leash, self._world.period, self._places, self._find_pairs
+            position,
+            self._constants.radius,
+            self._leash,
+            self._world.period,
+            self._places,
+            self._hulls,
+            self._find_pairs,
         )
         if self._world.gravity.any():
             # Resting contacts are gone through in this order.

@@ -53,7 +53,7 @@ class Neighbours(NamedTuple):
     lists: Lists
     later_start: np.ndarray  # (n + 1,) int64
     later: np.ndarray  # (m,) int32, the places of later neighbours of place p: later[later_start[p]:later_start[p + 1]]
-    normal: np.ndarray  # (m, 3) float32, what separated these two when that was last looked into; 0 before
+    normal: np.ndarray  # (m, 3) float32, what separated these two when that was last looked into; 0 before. Hulls only
 
 
 def places_of(position: np.ndarray, period: np.ndarray) -> Places:
@@ -193,9 +193,13 @@ def find_neighbours(
     leash: np.ndarray,
     period: np.ndarray,
     places: Places,
+    hulls: bool,
     find_pairs: FindPairs,
 ) -> tuple[Neighbours, int, int]:
-    """Neighbours of particles at ``position`` (n, 3) on leashes (n,); boxes compared, and candidate pairs found."""
+    """Neighbours of particles at ``position`` (n, 3) on leashes (n,); boxes compared, and candidate pairs found.
+
+    Without ``hulls`` among them no normals are kept.
+    """
     reach = radius + leash
     pairs, tested = _candidate_pairs(position, reach, period, places, find_pairs)
     candidates = len(pairs)
@@ -205,7 +209,7 @@ def find_neighbours(
     other = np.empty(2 * len(later), dtype=np.int32)
     _both_ways(later_start, later, start, other)
     lists = Lists(*places, start[:-1], other)
-    normal = np.zeros((len(later), 3), dtype=np.float32)
+    normal = np.zeros((len(later) if hulls else 0, 3), dtype=np.float32)
     return Neighbours(position.copy(), leash, lists, later_start, later, normal), tested, candidates
 
 
