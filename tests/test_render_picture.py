@@ -6,7 +6,6 @@ import pytest
 from particlesim import shapes
 from particlesim.constants import SPHERE
 from particlesim.rendering import Renderer
-from particlesim.rendering.visibility import look
 from particlesim.scene import Scene
 from particlesim.trajectory import Frame, Header
 
@@ -220,37 +219,6 @@ def test_frames_follow_the_particles_and_repeat_to_the_bit():
         assert np.array_equal(first, other.draw(frames[0]))
         other.close()
         assert np.array_equal(second, renderer.draw(frames[1]))
-
-
-def test_hidden_particles_that_are_left_out_change_no_pixel(monkeypatch):
-    rng = np.random.default_rng(5)
-    kinds = [shapes.sphere(), shapes.cube(), shapes.pyramid()]
-    number = np.arange(6000) % 3
-    header = make_header(kinds, number, rng.uniform(0.1, 0.5, 6000))
-    turn = rng.normal(size=(6000, 4))
-    turn /= np.linalg.norm(turn, axis=1)[:, None]
-    frame = make_frame(rng.uniform(-2.8, 2.8, (6000, 3)), turn)
-    looked = []
-
-    def look_at_all(*arguments):
-        sight = look(*arguments)
-        looked.append(len(sight.hulls))
-        # Drawn later, they would change a pixel only if they were before what is there.
-        hidden = np.setdiff1d(np.flatnonzero(number > 0), sight.hulls)
-        return sight._replace(hulls=np.concatenate([sight.hulls, hidden]))
-
-    # From without and from amidst the particles.
-    for eye in ((10.0, 0.0, 0.0), (1.0, 0.5, 0.2)):
-        scene = make_scene("red", "green", "blue", camera={"kind": "look-at", "position": eye})
-        with Renderer(scene, header) as renderer:
-            left_out = renderer.draw(frame)
-            monkeypatch.setattr("particlesim.rendering.renderer.look", look_at_all)
-            everything = renderer.draw(frame)
-            monkeypatch.undo()
-        # The light looks too, and draws none.
-        assert 0 < max(looked) < 2500
-        assert np.array_equal(left_out, everything)
-        looked.clear()
 
 
 def test_a_world_without_particles_in_sight_is_background():

@@ -71,11 +71,9 @@ def _cell_of(position, first, cell, i):
 
 @kernel
 def _share(way, corner):
-    """Of a particle so far on its way between eight cells, the share of one of them: three bits, those beyond being 1."""
+    """Of a particle so far on its way between eight cells, the share of one: three bits, 1 for beyond."""
     right, up, high = corner & 1, corner >> 1 & 1, corner >> 2
-    return (
-        (way[0] if right else 1.0 - way[0]) * (way[1] if up else 1.0 - way[1]) * (way[2] if high else 1.0 - way[2])
-    )
+    return (way[0] if right else 1.0 - way[0]) * (way[1] if up else 1.0 - way[1]) * (way[2] if high else 1.0 - way[2])
 
 
 @kernel

@@ -18,11 +18,11 @@ layout(std140, binding = 0) uniform View {
     vec4 haze;             // distance where it begins [m], 1 / distance over which it grows [1/m], strength at its end
 };
 
-float depth_of(vec3 place) {
-    return viewport.z + viewport.w / dot(forward.xyz, place);
+float depth_at(float close) {
+    return viewport.z + viewport.w * close;
 }
 
-// How much of the background's colour lies over what is at a place: far things are paler, which tells depth.
-float haze_at(vec3 place) {
-    return haze.z * clamp((dot(forward.xyz, place) - haze.x) * haze.y, 0.0, 1.0);
+// How much of the background's colour lies over what is so far away [m]: far things are paler, which tells depth.
+float haze_at(float distance) {
+    return haze.z * clamp((distance - haze.x) * haze.y, 0.0, 1.0);
 }
