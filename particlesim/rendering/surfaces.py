@@ -80,6 +80,8 @@ def _number(sight, bodies, number, seen, parts, balls, hulls):
     # Where the faces of each particle that is seen begin in the list of first rows of faces.
     first_slot = np.empty(len(seen), dtype=np.int64)
     row_of = np.full(4096, -1, dtype=np.int32)
+    # Most pixels show what the one before them shows.
+    last, last_face, told = -1, -1, -1
     for tile in range(balls.size):
         down, across = tile // balls.shape[1], tile % balls.shape[1]
         for y in range(down * TILE, min(down * TILE + TILE, height)):
@@ -87,29 +89,31 @@ def _number(sight, bodies, number, seen, parts, balls, hulls):
                 i = owner[y, x]
                 if i < 0:
                     continue
-                first = bodies.first_plane[bodies.shape[i]]
-                planes = bodies.first_plane[bodies.shape[i] + 1] - first
-                if number[i] < 0:
-                    number[i] = particles
-                    seen[particles] = i
-                    first_slot[particles] = slots
-                    particles += 1
-                    slots += max(planes, 1)
-                    while slots > len(row_of):
-                        row_of = np.append(row_of, np.full(len(row_of), -1, dtype=np.int32))
-                f = face[y, x] if planes else -1
-                slot = first_slot[number[i]] + max(f, 0)
-                if row_of[slot] < 0:
-                    row_of[slot] = rows
-                    parts[surfaces, 0], parts[surfaces, 1], parts[surfaces, 2] = number[i], f, rows
-                    surfaces += 1
-                    rows += _FACE_ROWS + bodies.corners[first + f] if planes else _BALL_ROWS
-                if planes:
+                if i != last or face[y, x] != last_face and told < -1:
+                    last, last_face = i, face[y, x]
+                    first = bodies.first_plane[bodies.shape[i]]
+                    planes = bodies.first_plane[bodies.shape[i] + 1] - first
+                    if number[i] < 0:
+                        number[i] = particles
+                        seen[particles] = i
+                        first_slot[particles] = slots
+                        particles += 1
+                        slots += max(planes, 1)
+                        while slots > len(row_of):
+                            row_of = np.append(row_of, np.full(len(row_of), -1, dtype=np.int32))
+                    f = last_face if planes else -1
+                    slot = first_slot[number[i]] + max(f, 0)
+                    if row_of[slot] < 0:
+                        row_of[slot] = rows
+                        parts[surfaces, 0], parts[surfaces, 1], parts[surfaces, 2] = number[i], f, rows
+                        surfaces += 1
+                        rows += _FACE_ROWS + bodies.corners[first + f] if planes else _BALL_ROWS
+                    told = -2 - row_of[slot] if planes else row_of[slot]
+                owner[y, x] = told
+                if told < 0:
                     hulls[down, across] = True
-                    owner[y, x] = -2 - row_of[slot]
                 else:
                     balls[down, across] = True
-                    owner[y, x] = row_of[slot]
     return particles, surfaces, rows
 
 
