@@ -42,10 +42,14 @@ def surfaces_of(sight: Sight, bodies: Bodies) -> Surfaces:
     height, width = sight.owner.shape
     number = np.full(len(bodies.shape), -1, dtype=np.int32)
     seen = np.empty(min(len(number), sight.owner.size), dtype=np.int64)
-    parts = np.empty((sight.owner.size, 3), dtype=np.int32)
+    seen = seen[: _list_particles(sight.owner, number, seen)]
+    faces = np.maximum(np.diff(bodies.first_plane)[bodies.shape[seen]], 1)
+    # Of each face of each of them, one after the other, its first row.
+    row_of = np.full(faces.sum(), -1, dtype=np.int32)
+    parts = np.empty((len(row_of), 3), dtype=np.int32)
     balls, hulls = np.zeros((2, -(-height // TILE), -(-width // TILE)), dtype=np.bool_)
-    particles, surfaces, rows = _number(sight, bodies, number, seen, parts, balls, hulls)
-    return Surfaces(seen[:particles], parts[:surfaces], rows, balls, hulls, sight.owner)
+    found, rows = _list_surfaces(sight, bodies, number, np.cumsum(faces) - faces, row_of, parts, balls, hulls)
+    return Surfaces(seen, parts[:found], rows, balls, hulls, sight.owner)
 
 
 def table_of(
@@ -72,49 +76,54 @@ def table_of(
 
 
 @kernel
-def _number(sight, bodies, number, seen, parts, balls, hulls):
-    """Give rows to what is seen, square by square; returns how many particles, surfaces and rows there are."""
+def _list_particles(owner, number, seen):
+    """Number those who own pixels, and list them; returns how many they are."""
+    found, last = 0, -1
+    for y in range(owner.shape[0]):
+        for x in range(owner.shape[1]):
+            i = owner[y, x]
+            # Most pixels show what the one before them shows.
+            if i != last:
+                last = i
+                if i >= 0 and number[i] < 0:
+                    number[i] = found
+                    seen[found] = i
+                    found += 1
+    return found
+
+
+@kernel
+def _list_surfaces(sight, bodies, number, first_slot, row_of, parts, balls, hulls):
+    """Write first rows in place of owners, tile by tile; returns how many surfaces and rows there are."""
+    sight, bodies = borrowed(sight), borrowed(bodies)
     owner, face = sight.owner, sight.face
     height, width = owner.shape
-    particles = surfaces = rows = slots = 0
-    # Where the faces of each particle that is seen begin in the list of first rows of faces.
-    first_slot = np.empty(len(seen), dtype=np.int64)
-    row_of = np.full(4096, -1, dtype=np.int32)
-    # Most pixels show what the one before them shows.
-    last, last_face, told = -1, -1, -1
+    surfaces = rows = 0
     for tile in range(balls.size):
         down, across = tile // balls.shape[1], tile % balls.shape[1]
+        any_ball = any_hull = False
+        last, last_face, told = -1, -1, -1
         for y in range(down * TILE, min(down * TILE + TILE, height)):
             for x in range(across * TILE, min(across * TILE + TILE, width)):
                 i = owner[y, x]
                 if i < 0:
                     continue
-                if i != last or face[y, x] != last_face and told < -1:
+                if i != last or (told < -1 and face[y, x] != last_face):
                     last, last_face = i, face[y, x]
                     first = bodies.first_plane[bodies.shape[i]]
-                    planes = bodies.first_plane[bodies.shape[i] + 1] - first
-                    if number[i] < 0:
-                        number[i] = particles
-                        seen[particles] = i
-                        first_slot[particles] = slots
-                        particles += 1
-                        slots += max(planes, 1)
-                        while slots > len(row_of):
-                            row_of = np.append(row_of, np.full(len(row_of), -1, dtype=np.int32))
-                    f = last_face if planes else -1
+                    is_hull = first < bodies.first_plane[bodies.shape[i] + 1]
+                    f = last_face if is_hull else -1
                     slot = first_slot[number[i]] + max(f, 0)
                     if row_of[slot] < 0:
                         row_of[slot] = rows
                         parts[surfaces, 0], parts[surfaces, 1], parts[surfaces, 2] = number[i], f, rows
                         surfaces += 1
-                        rows += _FACE_ROWS + bodies.corners[first + f] if planes else _BALL_ROWS
-                    told = -2 - row_of[slot] if planes else row_of[slot]
+                        rows += _FACE_ROWS + bodies.corners[first + f] if is_hull else _BALL_ROWS
+                    told = -2 - row_of[slot] if is_hull else row_of[slot]
+                    any_ball, any_hull = any_ball or not is_hull, any_hull or is_hull
                 owner[y, x] = told
-                if told < 0:
-                    hulls[down, across] = True
-                else:
-                    balls[down, across] = True
-    return particles, surfaces, rows
+        balls[down, across], hulls[down, across] = any_ball, any_hull
+    return surfaces, rows
 
 
 @kernel
