@@ -126,8 +126,8 @@ class Program(ShaderProgram):
 class Picture:
     """What a picture is made of besides the layers. The first rows of both maps are the lowest.
 
-    ``view_block``: the uniform block of shaders/common.glsl; ``shadow`` (h, w) float32, 0 .. 1: the shadow map,
-    how deep light goes in its box; ``first_row`` (height, width) int32 and ``surfaces`` (rows, 4) float32: what is seen
+    ``view_block``: the uniform block of shaders/common.glsl; ``shadow`` (h, w) float32: the shadow map, how
+    close to the light what it meets is [m]; ``first_row`` (height, width) int32 and ``surfaces`` (rows, 4) float32: what is seen
     at each pixel, see shaders/surface.glsl; ``ground`` (b, a) float32: share of the sky's light that reaches the floor,
     from its corner (-x, -y) to (x, y).
     """
@@ -151,10 +151,9 @@ class _Renderer(pyrender.Renderer):
         self._drawn = _Target(samples * size[0], samples * size[1], depth=True)
         self._final = self._drawn if samples == 1 else _Target(*size, depth=False)
         self._surfaces = int(gl.glGenTextures(1))
-        self._shadow, self._ground = _texture(gl.GL_LINEAR), _texture(gl.GL_LINEAR)
-        gl.glBindTexture(gl.GL_TEXTURE_2D, self._shadow)
-        gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_COMPARE_MODE, gl.GL_COMPARE_REF_TO_TEXTURE)
-        self._first_row = _texture(gl.GL_NEAREST)
+        # Beyond the edges of the shadow map light meets nothing, beyond those of the floor there is nothing to shade it.
+        self._shadow, self._ground = _texture(gl.GL_NEAREST, -np.inf), _texture(gl.GL_LINEAR, 1.0)
+        self._first_row = _texture(gl.GL_NEAREST, -1.0)
         gl.glBindBuffer(gl.GL_TEXTURE_BUFFER, self._table)
         gl.glBindTexture(gl.GL_TEXTURE_BUFFER, self._surfaces)
         gl.glTexBuffer(gl.GL_TEXTURE_BUFFER, gl.GL_RGBA32F, self._table)
@@ -186,7 +185,7 @@ class _Renderer(pyrender.Renderer):
         gl.glClear(gl.GL_COLOR_BUFFER_BIT | gl.GL_DEPTH_BUFFER_BIT)
         gl.glBlendFunc(gl.GL_SRC_ALPHA, gl.GL_ONE_MINUS_SRC_ALPHA)
         self._bind_surfaces()
-        _fill(_SHADOW_MAP, self._shadow, gl.GL_DEPTH_COMPONENT32F, gl.GL_DEPTH_COMPONENT, gl.GL_FLOAT, picture.shadow)
+        _fill(_SHADOW_MAP, self._shadow, gl.GL_R32F, gl.GL_RED, gl.GL_FLOAT, picture.shadow)
         _fill(_FIRST_ROW, self._first_row, gl.GL_R32I, gl.GL_RED_INTEGER, gl.GL_INT, picture.first_row)
         _fill(_GROUND, self._ground, gl.GL_R32F, gl.GL_RED, gl.GL_FLOAT, picture.ground)
         self._draw_layers(scene)
@@ -222,15 +221,15 @@ class _Renderer(pyrender.Renderer):
         return image
 
 
-def _texture(look_up: int) -> int:
-    """A map of a plane, 1 beyond its edges."""
+def _texture(look_up: int, beyond: float) -> int:
+    """A map of a plane, of one value beyond its edges."""
     texture = int(gl.glGenTextures(1))
     gl.glBindTexture(gl.GL_TEXTURE_2D, texture)
     gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_MIN_FILTER, look_up)
     gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_MAG_FILTER, look_up)
     gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_WRAP_S, gl.GL_CLAMP_TO_BORDER)
     gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_WRAP_T, gl.GL_CLAMP_TO_BORDER)
-    gl.glTexParameterfv(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_BORDER_COLOR, np.ones(4, dtype=np.float32))
+    gl.glTexParameterfv(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_BORDER_COLOR, np.full(4, beyond, dtype=np.float32))
     return texture
 
 

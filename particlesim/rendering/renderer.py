@@ -135,9 +135,8 @@ class Renderer:
         return np.column_stack([colours(frame, members), light])
 
     def _shadow_map(self, frame: Frame, groups: Groups) -> np.ndarray:
-        """How deep the key light goes into its box, (h, w) float32, 0 .. 1."""
-        close = look(self._light.outlook, self._bodies, groups, np.ascontiguousarray(frame.orientation)).close
-        return np.clip(0.5 - (0.5 / np.float32(self._light.reach[2])) * close, 0.0, 1.0)
+        """How close to the key light what it meets is, (h, w) float32 [m]."""
+        return look(self._light.outlook, self._bodies, groups, np.ascontiguousarray(frame.orientation)).close
 
     def _put_lines(self, view: View, cells: tuple[np.ndarray, np.ndarray, np.ndarray] | None) -> None:
         width = self._quality.samples * max(1.0, self._size[1] / 720.0)
@@ -162,7 +161,7 @@ class Renderer:
         rows = [
             (*eye, 0.0),
             (*self._light.towards, 0.0),
-            (1.0 / self._light.pixels[0], 1.0 / self._light.pixels[1], 0.0, 0.0),
+            (1.0 / self._light.pixels[0], 1.0 / self._light.pixels[1], *self._light.pixels),
             *self._about.colour_rows(),
             (width, height, 1.0, -view.near),
             (*-back, 2.0 * slope / height),
