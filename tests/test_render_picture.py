@@ -119,6 +119,17 @@ def test_nearer_particle_hides_the_farther_whatever_their_order():
         assert np.argmax(middle) == (0 if front == "red" else 1)
 
 
+@pytest.mark.parametrize("size", [(64, 48), (66, 50), (72, 56), (74, 58), (78, 46), (16, 14)])
+@pytest.mark.parametrize("shape", [shapes.sphere(), shapes.cube()], ids=["sphere", "cube"])
+def test_a_picture_full_of_one_particle_is_full_to_its_rims(size, shape):
+    # Whatever is left of tiles there.
+    scene = make_scene("black")
+    scene = scene.model_copy(update={"movie": scene.movie.model_copy(update={"resolution": size})})
+    image = draw(scene, [shape], [60.0], make_frame([(-40.0, 0.0, 0.0)]))
+    assert image.shape == (size[1], size[0], 3)
+    assert (image < 200).all()
+
+
 def test_touching_spheres_and_cubes_hide_each_other_by_their_true_surface():
     # The cube's front face lies before the sphere's centre but behind its foremost point.
     scene = make_scene("red", "blue")

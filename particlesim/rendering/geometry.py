@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-# Corners of the square that tiles and the floor are drawn on, in the order of a triangle strip.
+# Corners of the square that the floor is drawn on, in the order of a triangle strip.
 SQUARE = np.array([(-1, -1, 0), (1, -1, 0), (-1, 1, 0), (1, 1, 0)], dtype=np.float32)
 
 # Corners of a line's strip: x from its start to its end, y from one side to the other.

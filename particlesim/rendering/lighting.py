@@ -37,9 +37,9 @@ class Light(NamedTuple):
         return Outlook(self.axes, np.zeros(3), True, self.pixels[0] / (2.0 * self.reach[0]), self.pixels)
 
     def matrix(self, eye: np.ndarray) -> np.ndarray:
-        """From places seen from ``eye`` to coordinates in the shadow map, 0 .. 1, and closeness to the light [m]; (4, 4).
+        """From places seen from ``eye`` to coordinates in the shadow map, 0 .. 1, and closeness to the light [m].
 
-        Places seem a little closer than they are, or rounding would cast shadows.
+        (4, 4). Places seem a little closer than they are, or rounding would cast shadows.
         """
         matrix = np.eye(4)
         matrix[:3, :3] = self.axes * [[0.5 / self.reach[0]], [0.5 / self.reach[1]], [-1.0]]

@@ -46,18 +46,20 @@ class Kind:
     vertex_shader: str
     fragment_shader: str
     instance: tuple[int, ...] = ()  # floats of each instance attribute
+    mode: int = gl.GL_TRIANGLE_STRIP
     blend: bool = False  # lets through what is behind it, and hides nothing
 
 
-# Tiles of the picture, in which the canvas shades the spheres, or the hulls, that were found at its pixels.
-SPHERES = Kind("tile", "sphere", (2,))
-HULLS = Kind("tile", "face", (2,))
+# Tiles of the picture, in which the canvas shades the spheres, or the hulls, that were found at its pixels. As points:
+# of two triangles each, what is beside the line between them would be shaded twice.
+SPHERES = Kind("tile", "sphere", (2,), gl.GL_POINTS)
+HULLS = Kind("tile", "face", (2,), gl.GL_POINTS)
 FLOOR = Kind("floor", "floor")
 LINE = Kind("line", "line", (4, 3, 4), blend=True)
 
 
 class Layer(pyrender.Primitive):
-    """One strip of triangles drawn many times: ``corners`` (c, 3) float32 in their order."""
+    """One geometry drawn many times: ``corners`` (c, 3) float32 in the order in which ``kind.mode`` takes them."""
 
     def __init__(self, kind: Kind, corners: np.ndarray) -> None:
         super().__init__(positions=corners)
@@ -85,7 +87,7 @@ class Layer(pyrender.Primitive):
             gl.glBindBuffer(gl.GL_ARRAY_BUFFER, self._buffers[1])
             gl.glBufferData(gl.GL_ARRAY_BUFFER, self._rows.nbytes, self._rows, gl.GL_STREAM_DRAW)
             self._stale = False
-        gl.glDrawArraysInstanced(gl.GL_TRIANGLE_STRIP, 0, len(self._corners), self.count)
+        gl.glDrawArraysInstanced(self.kind.mode, 0, len(self._corners), self.count)
         self._unbind()
 
     def _add_to_context(self) -> None:
@@ -124,12 +126,12 @@ class Program(ShaderProgram):
 
 @dataclass(frozen=True)
 class Picture:
-    """What a picture is made of besides the layers. The first rows of both maps are the lowest.
+    """What a picture is made of besides the layers. The first rows of all maps are the lowest.
 
-    ``view_block``: the uniform block of shaders/common.glsl; ``shadow`` (h, w) float32: the shadow map, how
-    close to the light what it meets is [m]; ``first_row`` (height, width) int32 and ``surfaces`` (rows, 4) float32: what is seen
-    at each pixel, see shaders/surface.glsl; ``ground`` (b, a) float32: share of the sky's light that reaches the floor,
-    from its corner (-x, -y) to (x, y).
+    ``view_block``: the uniform block of shaders/common.glsl; ``shadow`` (h, w) float32: the shadow map, how close to
+    the light what it meets is [m]; ``first_row`` (height, width) int32 and ``surfaces`` (rows, 4) float32: what is
+    seen at each pixel, see shaders/surface.glsl; ``ground`` (b, a) float32: share of the sky's light that reaches the
+    floor, from its corner (-x, -y) to (x, y).
     """
 
     view_block: np.ndarray
@@ -151,7 +153,7 @@ class _Renderer(pyrender.Renderer):
         self._drawn = _Target(samples * size[0], samples * size[1], depth=True)
         self._final = self._drawn if samples == 1 else _Target(*size, depth=False)
         self._surfaces = int(gl.glGenTextures(1))
-        # Beyond the edges of the shadow map light meets nothing, beyond those of the floor there is nothing to shade it.
+        # Beyond the edges of the shadow map light meets nothing, beyond those of the floor nothing shades.
         self._shadow, self._ground = _texture(gl.GL_NEAREST, -np.inf), _texture(gl.GL_LINEAR, 1.0)
         self._first_row = _texture(gl.GL_NEAREST, -1.0)
         gl.glBindBuffer(gl.GL_TEXTURE_BUFFER, self._table)
@@ -180,6 +182,7 @@ class _Renderer(pyrender.Renderer):
         gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, self._drawn.framebuffer)
         gl.glViewport(0, 0, self._drawn.width, self._drawn.height)
         gl.glEnable(gl.GL_DEPTH_TEST)
+        gl.glEnable(gl.GL_PROGRAM_POINT_SIZE)
         gl.glDepthMask(gl.GL_TRUE)
         gl.glClearColor(*scene.bg_color)
         gl.glClear(gl.GL_COLOR_BUFFER_BIT | gl.GL_DEPTH_BUFFER_BIT)

@@ -23,7 +23,7 @@ from particlesim.rendering.sky import Sky
 from particlesim.rendering.smoothing import smooth_edges
 from particlesim.rendering.surfaces import TILE, surfaces_of, table_of
 from particlesim.rendering.surroundings import Surroundings
-from particlesim.rendering.visibility import look
+from particlesim.rendering.visibility import Sight, look
 from particlesim.scene import Scene
 from particlesim.trajectory import Frame, Header
 
@@ -62,7 +62,7 @@ class Renderer:
         self._sky = Sky(np.asarray(scene.world.size), bodies.outer) if quality.sky else None
         shaded = about.has_floor and quality.sky
         self._ground = Ground(*about.floor, bodies.inner, bodies.outer) if shaded else None
-        tile = TILE * (0.5 + 0.5 * geometry.SQUARE)
+        tile = np.array([(0.5 * TILE, 0.5 * TILE, 0.0)])
         self._spheres, self._hulls = bridge.Layer(bridge.SPHERES, tile), bridge.Layer(bridge.HULLS, tile)
         floor = [bridge.Layer(bridge.FLOOR, geometry.SQUARE)] if about.has_floor else []
         self._lines = bridge.Layer(bridge.LINE, geometry.STRIP)
@@ -90,9 +90,11 @@ class Renderer:
         self._settled = settled = self._settled or self._settle(self._first or frame)
         view = view_at(self._scene, frame.time, self._size[0] / self._size[1], settled.subject)
         groups = grouped(np.ascontiguousarray(frame.position), self._bodies.outer)
-        # The light looks while the camera does: each leaves a core idle now and then.
+        outlook = self._outlook(view)
+        sight = look(outlook, self._bodies, groups, np.ascontiguousarray(frame.orientation))
+        # While the light looks, what the camera saw is worked up: that leaves a core idle now and then.
         shadow = self._beside.submit(self._shadow_map, frame, groups)
-        first_row, surfaces = self._put_particles(frame, groups, settled.colours, view)
+        first_row, surfaces = self._put_particles(frame, settled.colours, outlook, sight)
         self._put_lines(view, cells)
         picture = self._bridge.Picture(
             view_block=self._view_block(view),
@@ -115,19 +117,21 @@ class Renderer:
             overlay=Overlay(self._scene, self._header, first, colours, self._about.dark),
         )
 
-    def _put_particles(
-        self, frame: Frame, groups: Groups, colours: ParticleColours, view: View
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Tiles into the layers of spheres and hulls; what is seen at each pixel, and its table (see Picture)."""
+    def _outlook(self, view: View) -> Outlook:
         slope = float(np.tan(0.5 * view.field_of_view))
         axes = view.pose[:3, :3].T * np.array([[1.0], [1.0], [-1.0]])
-        outlook = Outlook(axes, view.pose[:3, 3], False, 0.5 * self._drawn_size[1] / slope, self._drawn_size)
-        position, orientation = np.ascontiguousarray(frame.position), np.ascontiguousarray(frame.orientation)
-        surfaces = surfaces_of(look(outlook, self._bodies, groups, orientation), self._bodies)
+        return Outlook(axes, view.pose[:3, 3], False, 0.5 * self._drawn_size[1] / slope, self._drawn_size)
+
+    def _put_particles(
+        self, frame: Frame, colours: ParticleColours, outlook: Outlook, sight: Sight
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Tiles into the layers of spheres and hulls; what is seen at each pixel, and its table (see Picture)."""
+        surfaces = surfaces_of(sight, self._bodies)
         self._spheres.put(TILE * np.argwhere(surfaces.balls)[:, ::-1])
         self._hulls.put(TILE * np.argwhere(surfaces.hulls)[:, ::-1])
         paint = self._paint(frame, colours, surfaces.seen)
-        return surfaces.first_row, table_of(surfaces, self._bodies, outlook, position, orientation, paint)
+        place = np.ascontiguousarray(frame.position), np.ascontiguousarray(frame.orientation)
+        return surfaces.first_row, table_of(surfaces, self._bodies, outlook, *place, paint)
 
     def _paint(self, frame: Frame, colours: ParticleColours, members: np.ndarray) -> np.ndarray:
         """Linear colour, and share of the sky's light, of some particles, (k, 4) float64."""

@@ -75,8 +75,9 @@ def look(outlook: Outlook, bodies: Bodies, groups: Groups, orientation: np.ndarr
         view = axes, eye, outlook.parallel, window
         _look(order, middle, reach, groups, bodies, orientation, view, hull, sight, squares)
 
-    # What hides what in a strip of the picture is told by that strip alone.
-    Crew(sight.close.size).each(strip, shape[1])
+    # What hides what in a strip of the picture is told by that strip alone; some have more to look at than others.
+    crew = Crew(sight.close.size)
+    crew.each(strip, shape[1], 2 * crew.threads)
     return sight
 
 
