@@ -21,8 +21,9 @@ class Hull(NamedTuple):
     """Room for what is worked out of one hull after the other, of at most p planes and e edges.
 
     ``sides`` (p, 3): closeness of each plane as right * column + up * row + there; ``facing`` (p,) whether it faces
-    the one who looks; ``bound`` (p,) int64: the planes that are looked at, ``here`` (p,) how close they are where a row
-    begins; ``lines`` (e, 2): those that bound a row, at offset + slope * row: the left ones first, the right ones last.
+    the one who looks; ``bound`` (p,) int64: the planes that are looked at; ``here`` (p, 2): how close these are in a
+    row, as there + right * column; ``lines`` (e, 2): those that bound a row, at offset + slope * row: the left ones
+    first, the right ones last.
     """
 
     sides: np.ndarray
@@ -35,7 +36,7 @@ class Hull(NamedTuple):
 def room_for(bodies: Bodies) -> Hull:
     """Room for any of these particles."""
     p, e = len(bodies.planes), len(bodies.edges)
-    return Hull(np.empty((p, 3)), np.empty(p, np.bool_), np.empty(p, np.int64), np.empty(p), np.empty((e, 2)))
+    return Hull(np.empty((p, 3)), np.empty(p, np.bool_), np.empty(p, np.int64), np.empty((p, 2)), np.empty((e, 2)))
 
 
 @kernel
@@ -66,7 +67,7 @@ def _put_sides(i, x, y, z, m, bodies, parallel, window, hull):
     """Fill in the sides of a hull; returns how many are looked at: those before it, in a parallel view behind."""
     middle_x, middle_y, scale, _, _ = window
     shape, size = bodies.shape[i], bodies.size[i]
-    first, count = bodies.first_plane[shape], 0
+    first, count, pixel = bodies.first_plane[shape], 0, 1.0 / scale
     for f in range(bodies.first_plane[shape + 1] - first):
         nx, ny, nz, h = plane_of(m, bodies.planes, first + f)
         offset = nx * x + ny * y + nz * z + h * size
@@ -78,7 +79,7 @@ def _put_sides(i, x, y, z, m, bodies, parallel, window, hull):
             tiny = 1e-9 * size
             offset = offset if abs(offset) > tiny else tiny
             faces, per, there = offset < 0.0, 1.0 / offset, nz / offset
-        right, up = nx * per / scale, ny * per / scale
+        right, up = nx * per * pixel, ny * per * pixel
         hull.sides[f, 0], hull.sides[f, 1] = right, up
         hull.sides[f, 2] = there + right * (0.5 - middle_x) + up * (0.5 - middle_y)
         hull.facing[f] = faces
@@ -101,14 +102,14 @@ def _put_lines(bodies, shape, hull):
             a = hull.sides[f, 0] - hull.sides[g, 0]
             b = hull.sides[f, 1] - hull.sides[g, 1]
             c = hull.sides[f, 2] - hull.sides[g, 2]
-            a = a if a != 0.0 else 1e-300
-            if a > 0.0:
+            per = -1.0 / (a if a != 0.0 else 1e-300)
+            if per < 0.0:
                 place = left
                 left += 1
             else:
                 right -= 1
                 place = right
-            hull.lines[place, 0], hull.lines[place, 1] = -c / a, -b / a
+            hull.lines[place, 0], hull.lines[place, 1] = c * per, b * per
     return left, right
 
 
@@ -124,24 +125,31 @@ def _row(hull, left, right, row, first, last):
 
 
 @kernel
+def _put_here(hull, count, row):
+    """Fill in how close the planes are in a row."""
+    for k in range(count):
+        f = hull.bound[k]
+        hull.here[k, 0], hull.here[k, 1] = hull.sides[f, 1] * row + hull.sides[f, 2], hull.sides[f, 0]
+
+
+@kernel
 def trace_hull(i, x, y, z, m, bodies, window, box, hull, close, owner, face):
     """A hull before the eye."""
     count = _put_sides(i, x, y, z, m, bodies, False, window, hull)
     left, right = _put_lines(bodies, bodies.shape[i], hull)
     for row in range(box[0], box[1]):
         start, end = _row(hull, left, right, row, box[2], box[3])
-        for k in range(count if start < end else 0):
-            hull.here[k] = hull.sides[hull.bound[k], 1] * row + hull.sides[hull.bound[k], 2]
+        _put_here(hull, count if start < end else 0, row)
         for column in range(start, end):
             most, nearest = np.inf, 0
             for k in range(count):
-                q = hull.sides[hull.bound[k], 0] * column + hull.here[k]
+                q = hull.here[k, 0] + hull.here[k, 1] * column
                 if q < most:
-                    most, nearest = q, hull.bound[k]
+                    most, nearest = q, k
             if close[row, column] < most:
                 close[row, column] = most
                 owner[row, column] = i
-                face[row, column] = nearest
+                face[row, column] = hull.bound[nearest]
 
 
 @kernel
@@ -173,10 +181,9 @@ def cast_hull(i, x, y, z, m, bodies, window, box, hull, close):
     left, right = _put_lines(bodies, bodies.shape[i], hull)
     for row in range(box[0], box[1]):
         start, end = _row(hull, left, right, row, box[2], box[3])
-        for k in range(count if start < end else 0):
-            hull.here[k] = hull.sides[hull.bound[k], 1] * row + hull.sides[hull.bound[k], 2]
+        _put_here(hull, count if start < end else 0, row)
         for column in range(start, end):
             rear = -np.inf
             for k in range(count):
-                rear = max(rear, hull.sides[hull.bound[k], 0] * column + hull.here[k])
+                rear = max(rear, hull.here[k, 0] + hull.here[k, 1] * column)
             close[row, column] = max(close[row, column], rear)
