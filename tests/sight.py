@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from particlesim import shapes
 from particlesim.constants import SPHERE
 from particlesim.rendering.bodies import bodies_of
+from particlesim.rendering.groups import grouped
 from particlesim.rendering.outlook import Outlook
 from particlesim.trajectory import Header
 
@@ -31,7 +32,7 @@ class Crowd(NamedTuple):
     @property
     def where(self):
         """The other arguments that ``look`` wants."""
-        return self.bodies, self.position, self.orientation
+        return self.bodies, grouped(self.position, self.bodies.outer), self.orientation
 
     def only(self, members):
         """Some of them, in the order given."""
@@ -59,34 +60,32 @@ def outlook(eye, target=(0.0, 0.0, 0.0), parallel=False, scale=60.0, size=(83, 6
     return Outlook(np.array([right, np.cross(right, away), away]), np.asarray(eye, float), parallel, scale, size)
 
 
-def rays(view, moved=(0.0, 0.0)):
+def rays(view):
     """Start and way of the ray through each pixel, both (height, width, 3) along the view's axes, lowest row first."""
     width, height = view.size
-    across = (np.arange(width) + 0.5 - moved[0] - 0.5 * width) / view.scale
-    up = (np.arange(height) + 0.5 - moved[1] - 0.5 * height) / view.scale
+    across = (np.arange(width) + 0.5 - 0.5 * width) / view.scale
+    up = (np.arange(height) + 0.5 - 0.5 * height) / view.scale
     aside = np.zeros((height, width, 3))
     aside[..., 0], aside[..., 1] = np.meshgrid(across, up)
     ahead = np.broadcast_to([0.0, 0.0, 1.0], aside.shape)
     return (aside, ahead) if view.parallel else (np.zeros_like(aside), aside + ahead)
 
 
-def distances(view, crowd, moved=(0.0, 0.0)):
-    """Distance along the axis (n, height, width) at which each particle is met, inf where not; see ``look``.
-
-    ``moved``: how far hulls are drawn aside [pixels]. In a perspective view those that reach beside the eye are not
-    met: nothing is hidden by them.
-    """
+def distances(view, crowd):
+    """Distance along the axis (n, height, width) at which each particle is met, inf where not; see ``look``."""
     width, height = view.size
     middle = (crowd.position - view.eye) @ view.axes.T
-    exact, aside = rays(view), rays(view, moved)
     met = np.full((len(middle), height, width), np.inf)
     for i, kind in enumerate(crowd.number):
         shape, size = KINDS[kind], crowd.size[i]
         if shape.kind == SPHERE:
-            met[i] = _ball(view, *exact, middle[i], 0.5 * size)
-        elif view.parallel or middle[i, 2] > shape.radius * size:
-            enter, leave = _hull(view, *aside, middle[i], shape, size, crowd.orientation[i])
-            met[i] = np.where(enter <= leave, leave if view.parallel else enter, np.inf)
+            met[i] = _ball(view, *rays(view), middle[i], 0.5 * size)
+        else:
+            enter, leave, _ = through(view, *rays(view), middle[i], shape, size, crowd.orientation[i])
+            if view.parallel:
+                met[i] = np.where(enter <= leave, leave, np.inf)
+            else:  # before the eye, and not about it
+                met[i] = np.where((enter <= leave) & (enter > 0.0), enter, np.inf)
     return met
 
 
@@ -102,16 +101,21 @@ def _ball(view, start, way, middle, radius):
     return np.where((half >= 0.0) & (along > 0.0), (along - np.sqrt(np.maximum(half, 0.0))) / long, np.inf)
 
 
-def _hull(view, start, way, middle, shape, size, turn):
-    """Where rays pass into a hull and out of it: the half-spaces of its faces cut them off one by one."""
+def through(view, start, way, middle, shape, size, turn):
+    """Where rays pass into a hull and out of it, and the face by which they come in, each (height, width).
+
+    The half-spaces of its faces cut them off one by one.
+    """
     enter, leave = np.full(way.shape[:2], -np.inf), np.full(way.shape[:2], np.inf)
+    face = np.full(way.shape[:2], -1)
     turned = Rotation.from_quat(np.roll(turn, -1)).as_matrix()
-    for normal, loop in zip(shape.face_normals, shape.faces, strict=True):
+    for number, (normal, loop) in enumerate(zip(shape.face_normals, shape.faces, strict=True)):
         outward = view.axes @ turned @ normal
         before = outward @ middle + size * (normal @ shape.vertices[loop[0]]) - start @ outward
         into = way @ outward
         with np.errstate(divide="ignore"):
             cut = before / into
+        face = np.where((into < 0.0) & (cut > enter), number, face)
         enter = np.where(into < 0.0, np.maximum(enter, cut), enter)
         leave = np.where(into > 0.0, np.minimum(leave, cut), leave)
-    return enter, leave
+    return enter, leave, face

@@ -150,25 +150,6 @@ def test_every_scale_has_three_to_five_figures_on_it():
         assert low - 1e-6 * width <= values[0] and values[-1] <= low + width * (1 + 1e-6)
 
 
-def test_hull_mesh_is_closed_and_knows_its_edges():
-    for shape in (shapes.cube(), shapes.pyramid(), shapes.tetrahedron()):
-        rows, triangles = geometry.hull_mesh(shape)
-        a, b, c = (rows[triangles[:, k], :3].astype(float) for k in range(3))
-        assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0 == pytest.approx(shape.volume, rel=1e-6)
-        # A corner lies on two edges of its face.
-        assert np.all(np.sort(rows[:, 6:], axis=1)[:, 1] < 1e-6)
-
-
-def test_faces_of_many_corners_are_cut_into_fans():
-    turn = np.linspace(0.0, 2.0 * np.pi, 7)[:-1]
-    prism = shapes.hull("prism", [(np.cos(t), np.sin(t), z) for t in turn for z in (-1.0, 1.0)])
-    rows, triangles = geometry.hull_mesh(prism)
-    a, b, c = (rows[triangles[:, k], :3].astype(float) for k in range(3))
-    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0 == pytest.approx(prism.volume, rel=1e-6)
-    fans = rows[rows[:, 7] > 1e5]
-    assert len(fans) == 2 * 6 * 3 and fans[:, 6].max() == pytest.approx(np.sqrt(0.75), rel=1e-6)
-
-
 def test_cells_have_twelve_edges_each():
     lower = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
     rows = cell_lines(lower, lower + np.array([1.0, 2.0, 3.0]), np.array([1, 5]), width=1.0)

@@ -37,25 +37,26 @@ class Ground:
         """Share of the light that reaches the floor, (b, a) float32, from its corner (-x, -y) to (x, y)."""
         width, depth = (max(1, round(2.0 * half / self._step)) for half in self._half)
         light = np.ones((depth, width))
-        height = position[:, 2] - self._height
-        low = np.flatnonzero((height < _HIGHEST * self._radius) & (height > 0.0))
-        place = position[low, :2] + self._half
-        _shade(place, np.maximum(height[low], self._radius[low]), self._radius[low], 2.0 * self._half, light)
+        corner = np.array([*-self._half, self._height])
+        _shade(np.ascontiguousarray(position), self._radius, corner, 2.0 * self._half, light)
         return (1.0 - _SKY * (1.0 - light)).astype(np.float32)
 
 
 @kernel
-def _shade(place, height, radius, size, light):
-    """Take away what each sphere hides of an even sky.
+def _shade(position, radius, corner, size, light):
+    """Take away what each sphere close above the floor hides of an even sky.
 
     At a distance d from the point below a sphere of radius r at height h that is (r / h)^2 / (1 + (d / h)^2)^(3/2) of
     its light (plane element to sphere; J. R. Howell, A Catalog of Radiation Heat Transfer Configuration Factors).
     """
     rows, columns = light.shape
     across, along = columns / size[0], rows / size[1]
-    for k in range(len(place)):
-        h = height[k]
-        x, y, reach = place[k, 0], place[k, 1], _REACH * h
+    for k in range(len(position)):
+        h = position[k, 2] - corner[2]
+        if not 0.0 < h < _HIGHEST * radius[k]:
+            continue
+        h = max(h, radius[k])
+        x, y, reach = position[k, 0] - corner[0], position[k, 1] - corner[1], _REACH * h
         share = (radius[k] / h) ** 2 * min(_HIGHEST - h / radius[k], 1.0)
         for row in range(max(0, math.ceil((y - reach) * along - 0.5)), min(rows, math.ceil((y + reach) * along))):
             b = ((row + 0.5) / along - y) / h

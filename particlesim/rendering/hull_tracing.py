@@ -1,24 +1,42 @@
 """Hulls at the pixels of a picture: where they are the nearest so far (see visibility.py).
 
 Along a row of pixels the closeness of a plane changes evenly. The planes that face the one who looks bound that of the
-hull from above, the others from below, and a pixel sees the hull where that leaves room between them.
+hull from above, the others from below. Its outline are the edges where one of these meets one of those: on the line
+through such an edge both are as close.
 """
 
 from __future__ import annotations
 
-import math
+from typing import NamedTuple
 
 import numpy as np
 
 from particlesim.jit import kernel
+from particlesim.rendering.bodies import Bodies
+from particlesim.rendering.sphere_tracing import pixels
 from particlesim.vec import apply_transposed, matrix_of, row4, vector
 
-# OpenGL moves corners to places that it can tell apart, by at most 1/256 of a pixel: a hull hides only what is hidden
-# by it wherever within this [pixels] it is drawn, and is left out only if nobody saw it there.
-_MOVED = 1.0 / 128.0
 
-# Closeness is kept in single precision: what is nearer by less than this share is not hidden.
-ROUNDING = 1e-6
+class Hull(NamedTuple):
+    """Room for what is worked out of one hull after the other, of at most p planes and e edges.
+
+    ``sides`` (p, 3): closeness of each plane as right * column + up * row + there; ``facing`` (p,) whether it faces
+    the one who looks; ``bound`` (p,) int64: the planes that are looked at; ``here`` (p, 2): how close these are in a
+    row, as there + right * column; ``lines`` (e, 2): those that bound a row, at offset + slope * row: the left ones
+    first, the right ones last.
+    """
+
+    sides: np.ndarray
+    facing: np.ndarray
+    bound: np.ndarray
+    here: np.ndarray
+    lines: np.ndarray
+
+
+def room_for(bodies: Bodies) -> Hull:
+    """Room for any of these particles."""
+    p, e = len(bodies.planes), len(bodies.edges)
+    return Hull(np.empty((p, 3)), np.empty(p, np.bool_), np.empty(p, np.int64), np.empty((p, 2)), np.empty((e, 2)))
 
 
 @kernel
@@ -33,131 +51,139 @@ def turned(axes, orientation, i):
 
 
 @kernel
-def sides_of(x, y, z, size, m, planes, first, count, parallel, window, sides):
-    """Closeness of a hull's planes as right * column + up * row + there, and how much that is in a pixel's diagonal.
+def plane_of(m, planes, f):
+    """Normal of a plane in the axes of the one who looks, and its distance from the middle for size 1."""
+    a, b, c = planes[f, 0], planes[f, 1], planes[f, 2]
+    return (
+        m[0][0] * a + m[0][1] * b + m[0][2] * c,
+        m[1][0] * a + m[1][1] * b + m[1][2] * c,
+        m[2][0] * a + m[2][1] * b + m[2][2] * c,
+        planes[f, 3],
+    )
 
-    Planes that face the one who looks come first; returns how many they are.
-    """
+
+@kernel
+def _put_sides(i, x, y, z, m, bodies, parallel, window, hull):
+    """Fill in the sides of a hull; returns how many are looked at: those before it, in a parallel view behind."""
     middle_x, middle_y, scale, _, _ = window
-    facing, away = 0, count
-    for f in range(count):
-        a, b, c, h = planes[first + f, 0], planes[first + f, 1], planes[first + f, 2], planes[first + f, 3]
-        nx = m[0][0] * a + m[0][1] * b + m[0][2] * c
-        ny = m[1][0] * a + m[1][1] * b + m[1][2] * c
-        nz = m[2][0] * a + m[2][1] * b + m[2][2] * c
+    shape, size = bodies.shape[i], bodies.size[i]
+    first, count, pixel = bodies.first_plane[shape], 0, 1.0 / scale
+    for f in range(bodies.first_plane[shape + 1] - first):
+        nx, ny, nz, h = plane_of(m, bodies.planes, first + f)
         offset = nx * x + ny * y + nz * z + h * size
         if parallel:
             # A plane seen from its edge is as good as one that turns away a little.
             nz = nz if abs(nz) > 1e-9 else 1e-9
-            faces, right, up, there = nz < 0.0, nx / nz, ny / nz, -offset / nz
+            faces, per, there = nz < 0.0, 1.0 / nz, -offset / nz
         else:
             tiny = 1e-9 * size
             offset = offset if abs(offset) > tiny else tiny
-            faces, right, up, there = offset < 0.0, nx / offset, ny / offset, nz / offset
-        if faces:
-            place = facing
-            facing += 1
-        else:
-            away -= 1
-            place = away
-        right, up = right / scale, up / scale
-        sides[place, 0] = right
-        sides[place, 1] = up
-        sides[place, 2] = there + right * (0.5 - middle_x) + up * (0.5 - middle_y)
-        sides[place, 3] = abs(right) + abs(up)
-    return facing
+            faces, per, there = offset < 0.0, 1.0 / offset, nz / offset
+        right, up = nx * per * pixel, ny * per * pixel
+        hull.sides[f, 0], hull.sides[f, 1] = right, up
+        hull.sides[f, 2] = there + right * (0.5 - middle_x) + up * (0.5 - middle_y)
+        hull.facing[f] = faces
+        if faces != parallel:
+            hull.bound[count] = f
+            count += 1
+    return count
 
 
 @kernel
-def _most(sides, facing, row, column, grown):
-    """The greatest closeness of a hull at a pixel, by the planes that face the eye, grown by a part of a pixel."""
-    most = np.inf
-    for f in range(facing):
-        most = min(most, sides[f, 0] * column + sides[f, 1] * row + sides[f, 2] + grown * sides[f, 3])
-    return most
+def _put_lines(bodies, shape, hull):
+    """Fill in the lines of an outline; returns how many are left ones, and the first of the right ones."""
+    left, right = 0, len(hull.lines)
+    for edge in range(bodies.first_edge[shape], bodies.first_edge[shape + 1]):
+        f, g = bodies.edges[edge, 0], bodies.edges[edge, 1]
+        if hull.facing[f] != hull.facing[g]:
+            if hull.facing[g]:
+                f, g = g, f
+            # Where this is not below 0 the hull may be.
+            a = hull.sides[f, 0] - hull.sides[g, 0]
+            b = hull.sides[f, 1] - hull.sides[g, 1]
+            c = hull.sides[f, 2] - hull.sides[g, 2]
+            per = -1.0 / (a if a != 0.0 else 1e-300)
+            if per < 0.0:
+                place = left
+                left += 1
+            else:
+                right -= 1
+                place = right
+            hull.lines[place, 0], hull.lines[place, 1] = c * per, b * per
+    return left, right
 
 
 @kernel
-def _room(sides, facing, count, row, column, grown):
-    """By how much the planes of a hull leave room for it at a pixel, below 0 if it is not seen; and how that grows."""
-    most, least = np.inf, -np.inf
-    slope_most = slope_least = 0.0
-    for f in range(count):
-        q = sides[f, 0] * column + sides[f, 1] * row + sides[f, 2]
-        if f < facing:
-            q += grown * sides[f, 3]
-            if q < most:
-                most, slope_most = q, sides[f, 0]
-        else:
-            q -= grown * sides[f, 3]
-            if q > least:
-                least, slope_least = q, sides[f, 0]
-    return most - least, slope_most - slope_least
+def _row(hull, left, right, row, first, last):
+    """The pixels of a row whose middles see a hull: the first, and one past the last."""
+    start, end = -np.inf, np.inf
+    for line in range(left):
+        start = max(start, hull.lines[line, 0] + hull.lines[line, 1] * row)
+    for line in range(right, len(hull.lines)):
+        end = min(end, hull.lines[line, 0] + hull.lines[line, 1] * row)
+    return pixels(start, end, first, last) if start <= end else (first, first)
 
 
 @kernel
-def _border(sides, facing, count, row, column, end, grown):
-    """Where a row of pixels comes into a hull on its way from ``column`` to ``end``, or beyond that if it never does.
-
-    The room for the hull is concave along the row: the root of its slope is never beyond the border, and each planes'
-    corner is passed once.
-    """
-    way = 1.0 if end >= column else -1.0
-    for _ in range(count):
-        room, slope = _room(sides, facing, count, row, column, grown)
-        if room >= 0.0:
-            return column
-        if slope * way <= 0.0:
-            return end + way
-        column -= room / slope
-        if (column - end) * way > 0.0:
-            return column
-    return column
+def _put_here(hull, count, row):
+    """Fill in how close the planes are in a row."""
+    for k in range(count):
+        f = hull.bound[k]
+        hull.here[k, 0], hull.here[k, 1] = hull.sides[f, 1] * row + hull.sides[f, 2], hull.sides[f, 0]
 
 
 @kernel
-def _seen_in_row(sides, facing, count, row, start, end, grown):
-    """The pixels ``start .. end`` of a row whose middles see a hull: the first, and one past the last."""
-    left = _border(sides, facing, count, row, float(start), end - 1.0, grown)
-    if left > end - 1.0:
-        return start, start
-    right = _border(sides, facing, count, row, end - 1.0, left, grown)
-    return math.ceil(left), math.floor(right) + 1
-
-
-@kernel
-def trace_hull(sides, facing, count, box, close, owner):
-    """Whether a hull may be seen; it hides what is behind it."""
-    seen = False
+def trace_hull(i, x, y, z, m, bodies, window, box, hull, close, owner, face):
+    """A hull before the eye."""
+    count = _put_sides(i, x, y, z, m, bodies, False, window, hull)
+    left, right = _put_lines(bodies, bodies.shape[i], hull)
     for row in range(box[0], box[1]):
-        start, end = _seen_in_row(sides, facing, count, row, box[2], box[3], -_MOVED)
+        start, end = _row(hull, left, right, row, box[2], box[3])
+        _put_here(hull, count if start < end else 0, row)
         for column in range(start, end):
-            most = _most(sides, facing, row, column, -_MOVED)
+            most, nearest = np.inf, 0
+            for k in range(count):
+                q = hull.here[k, 0] + hull.here[k, 1] * column
+                if q < most:
+                    most, nearest = q, k
             if close[row, column] < most:
                 close[row, column] = most
-                owner[row, column] = -1
-                seen = True
-    return seen or _peeps_out(sides, facing, count, box, close)
+                owner[row, column] = i
+                face[row, column] = hull.bound[nearest]
 
 
 @kernel
-def _peeps_out(sides, facing, count, box, close):
-    """Whether any pixel might see a hull that is a little larger, and nearer, than it is."""
-    for row in range(box[0], box[1]):
-        start, end = _seen_in_row(sides, facing, count, row, box[2], box[3], _MOVED)
-        for column in range(start, end):
-            if close[row, column] < _most(sides, facing, row, column, _MOVED) * (1.0 + ROUNDING):
-                return True
-    return False
+def trace_hull_beside(i, x, y, z, m, bodies, window, hull, close, owner, face):
+    """A hull that reaches beside the eye: any pixel may see it. None does from within."""
+    planes = bodies.first_plane[bodies.shape[i] + 1] - bodies.first_plane[bodies.shape[i]]
+    if not _put_sides(i, x, y, z, m, bodies, False, window, hull):
+        return
+    for row in range(len(close)):
+        for column in range(window[3], window[4]):
+            # Behind the eye closeness is below 0.
+            most, least, nearest = np.inf, 0.0, 0
+            for f in range(planes):
+                q = hull.sides[f, 0] * column + hull.sides[f, 1] * row + hull.sides[f, 2]
+                if not hull.facing[f]:
+                    least = max(least, q)
+                elif q < most:
+                    most, nearest = q, f
+            if least < most and close[row, column] < most:
+                close[row, column] = most
+                owner[row, column] = i
+                face[row, column] = nearest
 
 
 @kernel
-def cast_hull(sides, facing, count, box, close):
+def cast_hull(i, x, y, z, m, bodies, window, box, hull, close):
     """A hull in the light hides it from what is behind its rear."""
+    count = _put_sides(i, x, y, z, m, bodies, True, window, hull)
+    left, right = _put_lines(bodies, bodies.shape[i], hull)
     for row in range(box[0], box[1]):
-        start, end = _seen_in_row(sides, facing, count, row, box[2], box[3], 0.0)
+        start, end = _row(hull, left, right, row, box[2], box[3])
+        _put_here(hull, count if start < end else 0, row)
         for column in range(start, end):
             rear = -np.inf
-            for f in range(facing, count):
-                rear = max(rear, sides[f, 0] * column + sides[f, 1] * row + sides[f, 2])
+            for k in range(count):
+                rear = max(rear, hull.here[k, 0] + hull.here[k, 1] * column)
             close[row, column] = max(close[row, column], rear)

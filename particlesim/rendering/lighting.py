@@ -13,6 +13,9 @@ from particlesim.scene import Scene
 # Height of the key light above the horizon [degrees]: shadows stay short and under their particles.
 _ELEVATION = 58.0
 
+# What is behind another by less than this share of the depth of the box is not in its shadow.
+_BEFORE = 1.2e-3
+
 # The box is a little larger than the world, for what leans out of it.
 _ROOM = 1.04
 
@@ -34,10 +37,13 @@ class Light(NamedTuple):
         return Outlook(self.axes, np.zeros(3), True, self.pixels[0] / (2.0 * self.reach[0]), self.pixels)
 
     def matrix(self, eye: np.ndarray) -> np.ndarray:
-        """From places seen from ``eye`` to coordinates and depth in the shadow map, all 0 .. 1; (4, 4)."""
+        """From places seen from ``eye`` to coordinates in the shadow map, 0 .. 1, and closeness to the light [m].
+
+        (4, 4). Places seem a little closer than they are, or rounding would cast shadows.
+        """
         matrix = np.eye(4)
-        matrix[:3, :3] = 0.5 * self.axes / self.reach[:, None]
-        matrix[:3, 3] = 0.5 + matrix[:3, :3] @ eye
+        matrix[:3, :3] = self.axes * [[0.5 / self.reach[0]], [0.5 / self.reach[1]], [-1.0]]
+        matrix[:3, 3] = matrix[:3, :3] @ eye + [0.5, 0.5, _BEFORE * self.reach[2]]
         return matrix
 
 

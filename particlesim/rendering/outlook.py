@@ -22,9 +22,8 @@ class Outlook(NamedTuple):
     size: tuple[int, int]
 
 
-def nearest_first(outlook: Outlook, position: np.ndarray) -> np.ndarray:
-    """All particles, (n,) int64, roughly the nearer ones first."""
-    away = (position - outlook.eye) @ outlook.axes[2]
+def nearest_first(away: np.ndarray) -> np.ndarray:
+    """The order of what is so far ``away``, (k,), int64: roughly the nearer first."""
     low, high = (away.min(), away.max()) if len(away) else (0.0, 0.0)
     # Distances in so many steps are sorted in a time that grows with their number only.
     steps = (away - low) * (65535.0 / (high - low) if high > low else 0.0)

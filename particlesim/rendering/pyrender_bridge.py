@@ -35,7 +35,7 @@ from pyrender.shader_program import ShaderProgram  # noqa: E402
 _SHADERS = Path(__file__).with_name("shaders")
 _FLOAT = 4  # bytes
 # Binding points, as the shaders have them: texture units, and that of the uniform block.
-_SHADOW_MAP, _OWNER, _SPHERES, _GROUND = gl.GL_TEXTURE0, gl.GL_TEXTURE1, gl.GL_TEXTURE2, gl.GL_TEXTURE3
+_SHADOW_MAP, _FIRST_ROW, _SURFACES, _GROUND = gl.GL_TEXTURE0, gl.GL_TEXTURE1, gl.GL_TEXTURE2, gl.GL_TEXTURE3
 _VIEW_BLOCK = 0  # binding point of the uniform block shared by all
 
 
@@ -43,33 +43,28 @@ _VIEW_BLOCK = 0  # binding point of the uniform block shared by all
 class Kind:
     """What a layer's instances are: its shaders, the floats of each attribute, and how it meets other layers."""
 
-    name: str
-    vertex: tuple[int, ...]  # floats of each vertex attribute, the first three being a place
-    instance: tuple[int, ...]  # floats of each instance attribute
-    mode: int = gl.GL_TRIANGLES
-    cull: bool = False  # only faces towards the camera are drawn
+    vertex_shader: str
+    fragment_shader: str
+    instance: tuple[int, ...] = ()  # floats of each instance attribute
+    mode: int = gl.GL_TRIANGLE_STRIP
     blend: bool = False  # lets through what is behind it, and hides nothing
 
 
-# Tiles of the picture in which the canvas shades the spheres that were found at its pixels.
-SPHERES = Kind("sphere", (3,), (2,), gl.GL_TRIANGLE_STRIP)
-HULL = Kind("hull", (3, 3, 4), (4, 4, 4), cull=True)
-FLOOR = Kind("floor", (3,), (), gl.GL_TRIANGLE_STRIP)
-LINE = Kind("line", (3,), (4, 3, 4), gl.GL_TRIANGLE_STRIP, blend=True)
+# Tiles of the picture, in which the canvas shades the spheres, or the hulls, that were found at its pixels. As points:
+# of two triangles each, what is beside the line between them would be shaded twice.
+SPHERES = Kind("tile", "sphere", (2,), gl.GL_POINTS)
+HULLS = Kind("tile", "face", (2,), gl.GL_POINTS)
+FLOOR = Kind("floor", "floor")
+LINE = Kind("line", "line", (4, 3, 4), blend=True)
 
 
 class Layer(pyrender.Primitive):
-    """One geometry drawn many times. ``vertices`` (v, sum of kind.vertex) float32, drawn as ``kind.mode`` says.
+    """One geometry drawn many times: ``corners`` (c, 3) float32 in the order in which ``kind.mode`` takes them."""
 
-    ``triangles`` (t, 3) uint32 are rows of ``vertices``; without them the vertices are drawn in their order.
-    """
-
-    def __init__(self, kind: Kind, vertices: np.ndarray, triangles: np.ndarray | None = None) -> None:
-        super().__init__(positions=vertices[:, :3])
+    def __init__(self, kind: Kind, corners: np.ndarray) -> None:
+        super().__init__(positions=corners)
         self.kind = kind
-        order = np.arange(len(vertices)) if triangles is None else triangles
-        self._order = np.ascontiguousarray(order, dtype=np.uint32).ravel()
-        self._vertices = np.ascontiguousarray(vertices, dtype=np.float32)
+        self._corners = np.ascontiguousarray(corners, dtype=np.float32)
         self._rows = np.zeros((0 if kind.instance else 1, sum(kind.instance)), dtype=np.float32)
         self._stale = False
 
@@ -92,21 +87,18 @@ class Layer(pyrender.Primitive):
             gl.glBindBuffer(gl.GL_ARRAY_BUFFER, self._buffers[1])
             gl.glBufferData(gl.GL_ARRAY_BUFFER, self._rows.nbytes, self._rows, gl.GL_STREAM_DRAW)
             self._stale = False
-        order, none = len(self._order), ctypes.c_void_p(0)
-        gl.glDrawElementsInstanced(self.kind.mode, order, gl.GL_UNSIGNED_INT, none, self.count)
+        gl.glDrawArraysInstanced(self.kind.mode, 0, len(self._corners), self.count)
         self._unbind()
 
     def _add_to_context(self) -> None:
         self._vaid = gl.glGenVertexArrays(1)
         gl.glBindVertexArray(self._vaid)
-        self._buffers = [int(buffer) for buffer in gl.glGenBuffers(3)]
+        self._buffers = [int(buffer) for buffer in gl.glGenBuffers(2)]
         gl.glBindBuffer(gl.GL_ARRAY_BUFFER, self._buffers[0])
-        gl.glBufferData(gl.GL_ARRAY_BUFFER, self._vertices.nbytes, self._vertices, gl.GL_STATIC_DRAW)
-        self._attributes(0, self.kind.vertex, divisor=0)
+        gl.glBufferData(gl.GL_ARRAY_BUFFER, self._corners.nbytes, self._corners, gl.GL_STATIC_DRAW)
+        self._attributes(0, (3,), divisor=0)
         gl.glBindBuffer(gl.GL_ARRAY_BUFFER, self._buffers[1])
-        self._attributes(len(self.kind.vertex), self.kind.instance, divisor=1)
-        gl.glBindBuffer(gl.GL_ELEMENT_ARRAY_BUFFER, self._buffers[2])
-        gl.glBufferData(gl.GL_ELEMENT_ARRAY_BUFFER, self._order.nbytes, self._order, gl.GL_STATIC_DRAW)
+        self._attributes(1, self.kind.instance, divisor=1)
         gl.glBindVertexArray(0)
         self._stale = True
 
@@ -134,18 +126,18 @@ class Program(ShaderProgram):
 
 @dataclass(frozen=True)
 class Picture:
-    """What a picture is made of besides the layers. The first rows of both maps are the lowest.
+    """What a picture is made of besides the layers. The first rows of all maps are the lowest.
 
-    ``view_block``: the uniform block of shaders/common.glsl; ``shadow`` (h, w) float32, 0 .. 1: the shadow map,
-    how deep light goes in its box; ``owner`` (height, width) int32: number of the sphere at each pixel, or -1;
-    ``spheres`` (k, 8) float32: centre [m], radius [m], linear colour and share of the sky's light; ``ground`` (b, a)
-    float32: share of the sky's light that reaches the floor, from its corner (-x, -y) to (x, y).
+    ``view_block``: the uniform block of shaders/common.glsl; ``shadow`` (h, w) float32: the shadow map, how close to
+    the light what it meets is [m]; ``first_row`` (height, width) int32 and ``surfaces`` (rows, 4) float32: what is
+    seen at each pixel, see shaders/surface.glsl; ``ground`` (b, a) float32: share of the sky's light that reaches the
+    floor, from its corner (-x, -y) to (x, y).
     """
 
     view_block: np.ndarray
     shadow: np.ndarray
-    owner: np.ndarray
-    spheres: np.ndarray
+    first_row: np.ndarray
+    surfaces: np.ndarray
     ground: np.ndarray
 
 
@@ -156,17 +148,16 @@ class _Renderer(pyrender.Renderer):
 
     def __init__(self, size: tuple[int, int], samples: int) -> None:
         super().__init__(samples * size[0], samples * size[1])
-        self._programs: dict[str, Program] = {}
+        self._programs: dict[Kind, Program] = {}
         self._block, self._table = (int(buffer) for buffer in gl.glGenBuffers(2))
         self._drawn = _Target(samples * size[0], samples * size[1], depth=True)
         self._final = self._drawn if samples == 1 else _Target(*size, depth=False)
-        self._spheres = int(gl.glGenTextures(1))
-        self._shadow, self._ground = _texture(gl.GL_LINEAR), _texture(gl.GL_LINEAR)
-        gl.glBindTexture(gl.GL_TEXTURE_2D, self._shadow)
-        gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_COMPARE_MODE, gl.GL_COMPARE_REF_TO_TEXTURE)
-        self._owner = _texture(gl.GL_NEAREST)
+        self._surfaces = int(gl.glGenTextures(1))
+        # Beyond the edges of the shadow map light meets nothing, beyond those of the floor nothing shades.
+        self._shadow, self._ground = _texture(gl.GL_NEAREST, -np.inf), _texture(gl.GL_LINEAR, 1.0)
+        self._first_row = _texture(gl.GL_NEAREST, -1.0)
         gl.glBindBuffer(gl.GL_TEXTURE_BUFFER, self._table)
-        gl.glBindTexture(gl.GL_TEXTURE_BUFFER, self._spheres)
+        gl.glBindTexture(gl.GL_TEXTURE_BUFFER, self._surfaces)
         gl.glTexBuffer(gl.GL_TEXTURE_BUFFER, gl.GL_RGBA32F, self._table)
 
     def render(self, scene: pyrender.Scene, flags: int, seg_node_map: Any = None) -> np.ndarray:
@@ -179,40 +170,41 @@ class _Renderer(pyrender.Renderer):
         # pyrender deletes objects by number here, in whatever context is then current. Ours go with their context.
         pass
 
-    def _use(self, name: str) -> None:
-        if name not in self._programs:
-            self._programs[name] = Program(str(_SHADERS / f"{name}.vert"), str(_SHADERS / f"{name}.frag"))
-            self._programs[name]._add_to_context()
-        self._programs[name]._bind()
+    def _use(self, kind: Kind) -> None:
+        if kind not in self._programs:
+            shaders = (f"{kind.vertex_shader}.vert", f"{kind.fragment_shader}.frag")
+            self._programs[kind] = Program(*(str(_SHADERS / shader) for shader in shaders))
+            self._programs[kind]._add_to_context()
+        self._programs[kind]._bind()
 
     def _forward_pass(self, scene: pyrender.Scene, flags: int, seg_node_map: Any = None) -> np.ndarray:
         picture = self.picture
         gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, self._drawn.framebuffer)
         gl.glViewport(0, 0, self._drawn.width, self._drawn.height)
         gl.glEnable(gl.GL_DEPTH_TEST)
+        gl.glEnable(gl.GL_PROGRAM_POINT_SIZE)
         gl.glDepthMask(gl.GL_TRUE)
         gl.glClearColor(*scene.bg_color)
         gl.glClear(gl.GL_COLOR_BUFFER_BIT | gl.GL_DEPTH_BUFFER_BIT)
         gl.glBlendFunc(gl.GL_SRC_ALPHA, gl.GL_ONE_MINUS_SRC_ALPHA)
-        self._bind_spheres()
-        _fill(_SHADOW_MAP, self._shadow, gl.GL_DEPTH_COMPONENT32F, gl.GL_DEPTH_COMPONENT, gl.GL_FLOAT, picture.shadow)
-        _fill(_OWNER, self._owner, gl.GL_R32I, gl.GL_RED_INTEGER, gl.GL_INT, picture.owner)
+        self._bind_surfaces()
+        _fill(_SHADOW_MAP, self._shadow, gl.GL_R32F, gl.GL_RED, gl.GL_FLOAT, picture.shadow)
+        _fill(_FIRST_ROW, self._first_row, gl.GL_R32I, gl.GL_RED_INTEGER, gl.GL_INT, picture.first_row)
         _fill(_GROUND, self._ground, gl.GL_R32F, gl.GL_RED, gl.GL_FLOAT, picture.ground)
         self._draw_layers(scene)
         return self._read_main_framebuffer(scene, flags)
 
-    def _bind_spheres(self) -> None:
-        spheres = np.ascontiguousarray(self.picture.spheres)
-        gl.glActiveTexture(_SPHERES)
-        gl.glBindTexture(gl.GL_TEXTURE_BUFFER, self._spheres)
+    def _bind_surfaces(self) -> None:
+        table = np.ascontiguousarray(self.picture.surfaces)
+        gl.glActiveTexture(_SURFACES)
+        gl.glBindTexture(gl.GL_TEXTURE_BUFFER, self._surfaces)
         gl.glBindBuffer(gl.GL_TEXTURE_BUFFER, self._table)
-        gl.glBufferData(gl.GL_TEXTURE_BUFFER, spheres.nbytes, spheres, gl.GL_STREAM_DRAW)
+        gl.glBufferData(gl.GL_TEXTURE_BUFFER, table.nbytes, table, gl.GL_STREAM_DRAW)
 
     def _draw_layers(self, scene: pyrender.Scene) -> None:
         for layer in (layer for mesh in scene.meshes for layer in mesh.primitives):
             kind = layer.kind
-            self._use(kind.name)
-            (gl.glEnable if kind.cull else gl.glDisable)(gl.GL_CULL_FACE)
+            self._use(kind)
             (gl.glEnable if kind.blend else gl.glDisable)(gl.GL_BLEND)
             gl.glDepthMask(not kind.blend)
             layer.draw()
@@ -232,15 +224,15 @@ class _Renderer(pyrender.Renderer):
         return image
 
 
-def _texture(look_up: int) -> int:
-    """A map of a plane, 1 beyond its edges."""
+def _texture(look_up: int, beyond: float) -> int:
+    """A map of a plane, of one value beyond its edges."""
     texture = int(gl.glGenTextures(1))
     gl.glBindTexture(gl.GL_TEXTURE_2D, texture)
     gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_MIN_FILTER, look_up)
     gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_MAG_FILTER, look_up)
     gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_WRAP_S, gl.GL_CLAMP_TO_BORDER)
     gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_WRAP_T, gl.GL_CLAMP_TO_BORDER)
-    gl.glTexParameterfv(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_BORDER_COLOR, np.ones(4, dtype=np.float32))
+    gl.glTexParameterfv(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_BORDER_COLOR, np.full(4, beyond, dtype=np.float32))
     return texture
 
 

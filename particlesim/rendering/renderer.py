@@ -8,22 +8,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.constants import SPHERE
 from particlesim.rendering import geometry, platform
 from particlesim.rendering.bodies import bodies_of
 from particlesim.rendering.camera import Box, View, subject_box, view_at
 from particlesim.rendering.cells import cell_lines
 from particlesim.rendering.colour import ParticleColours
 from particlesim.rendering.ground import Ground
+from particlesim.rendering.groups import Groups, grouped
 from particlesim.rendering.lighting import key_light
 from particlesim.rendering.outlook import Outlook
 from particlesim.rendering.overlay import Overlay
 from particlesim.rendering.quality import PRESETS
 from particlesim.rendering.sky import Sky
 from particlesim.rendering.smoothing import smooth_edges
-from particlesim.rendering.sphere_tracing import TILE
+from particlesim.rendering.surfaces import TILE, surfaces_of, table_of
 from particlesim.rendering.surroundings import Surroundings
-from particlesim.rendering.visibility import look, renumber
+from particlesim.rendering.visibility import Sight, look
 from particlesim.scene import Scene
 from particlesim.trajectory import Frame, Header
 
@@ -62,15 +62,11 @@ class Renderer:
         self._sky = Sky(np.asarray(scene.world.size), bodies.outer) if quality.sky else None
         shaded = about.has_floor and quality.sky
         self._ground = Ground(*about.floor, bodies.inner, bodies.outer) if shaded else None
-        self._spheres = bridge.Layer(bridge.SPHERES, TILE * (0.5 + 0.5 * geometry.SQUARE))
-        self._hulls = {
-            number: bridge.Layer(bridge.HULL, *geometry.hull_mesh(shape))
-            for number, shape in enumerate(header.shapes)
-            if shape.kind != SPHERE
-        }
+        tile = np.array([(0.5 * TILE, 0.5 * TILE, 0.0)])
+        self._spheres, self._hulls = bridge.Layer(bridge.SPHERES, tile), bridge.Layer(bridge.HULLS, tile)
         floor = [bridge.Layer(bridge.FLOOR, geometry.SQUARE)] if about.has_floor else []
         self._lines = bridge.Layer(bridge.LINE, geometry.STRIP)
-        layers = [self._spheres, *self._hulls.values(), *floor, self._lines]
+        layers = [self._spheres, self._hulls, *floor, self._lines]
         self._canvas = bridge.Canvas(found, self._size, layers, about.background, quality.samples)
 
     def __enter__(self) -> Renderer:
@@ -93,15 +89,18 @@ class Renderer:
         """
         self._settled = settled = self._settled or self._settle(self._first or frame)
         view = view_at(self._scene, frame.time, self._size[0] / self._size[1], settled.subject)
-        # The light looks while the camera does: each leaves a core idle now and then.
-        shadow = self._beside.submit(self._shadow_map, frame)
-        owner, spheres = self._put_particles(frame, settled.colours, view)
+        groups = grouped(np.ascontiguousarray(frame.position), self._bodies.outer)
+        outlook = self._outlook(view)
+        sight = look(outlook, self._bodies, groups, np.ascontiguousarray(frame.orientation))
+        # While the light looks, what the camera saw is worked up: that leaves a core idle now and then.
+        shadow = self._beside.submit(self._shadow_map, frame, groups)
+        first_row, surfaces = self._put_particles(frame, settled.colours, outlook, sight)
         self._put_lines(view, cells)
         picture = self._bridge.Picture(
             view_block=self._view_block(view),
             shadow=shadow.result(),
-            owner=owner,
-            spheres=spheres,
+            first_row=first_row,
+            surfaces=surfaces,
             ground=np.ones((1, 1)) if self._ground is None else self._ground.light(frame.position),
         )
         drawn = self._canvas.draw(picture)
@@ -118,34 +117,30 @@ class Renderer:
             overlay=Overlay(self._scene, self._header, first, colours, self._about.dark),
         )
 
-    def _put_particles(self, frame: Frame, colours: ParticleColours, view: View) -> tuple[np.ndarray, np.ndarray]:
-        """Hulls into their layers; of spheres, the number at each pixel, and their rows (see Picture)."""
+    def _outlook(self, view: View) -> Outlook:
         slope = float(np.tan(0.5 * view.field_of_view))
         axes = view.pose[:3, :3].T * np.array([[1.0], [1.0], [-1.0]])
-        outlook = Outlook(axes, view.pose[:3, 3], False, 0.5 * self._drawn_size[1] / slope, self._drawn_size)
-        sight = look(outlook, self._bodies, *_places(frame))
-        self._spheres.put(TILE * np.argwhere(sight.tiles)[:, ::-1])
-        spheres = renumber(sight.owner, len(frame.position))
-        # Together, as the light of the sky is worked out for all places at once.
-        paint = self._paint(frame, colours, np.concatenate([sight.hulls, spheres]))
-        of_hulls, of_spheres = paint[: len(sight.hulls)], paint[len(sight.hulls) :]
-        for number, layer in self._hulls.items():
-            mine = self._header.shape[sight.hulls] == number
-            members = sight.hulls[mine]
-            pose = [frame.position[members], self._header.size[members, None], frame.orientation[members]]
-            layer.put(np.hstack([*pose, of_hulls[mine]]))
-        ball = np.column_stack([frame.position[spheres], self._bodies.outer[spheres]])
-        return sight.owner, np.hstack([ball, of_spheres], dtype=np.float32)
+        return Outlook(axes, view.pose[:3, 3], False, 0.5 * self._drawn_size[1] / slope, self._drawn_size)
+
+    def _put_particles(
+        self, frame: Frame, colours: ParticleColours, outlook: Outlook, sight: Sight
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Tiles into the layers of spheres and hulls; what is seen at each pixel, and its table (see Picture)."""
+        surfaces = surfaces_of(sight, self._bodies)
+        self._spheres.put(TILE * np.argwhere(surfaces.balls)[:, ::-1])
+        self._hulls.put(TILE * np.argwhere(surfaces.hulls)[:, ::-1])
+        paint = self._paint(frame, colours, surfaces.seen)
+        place = np.ascontiguousarray(frame.position), np.ascontiguousarray(frame.orientation)
+        return surfaces.first_row, table_of(surfaces, self._bodies, outlook, *place, paint)
 
     def _paint(self, frame: Frame, colours: ParticleColours, members: np.ndarray) -> np.ndarray:
         """Linear colour, and share of the sky's light, of some particles, (k, 4) float64."""
         light = self._sky.light(frame.position, members) if self._sky is not None else np.ones(len(members))
         return np.column_stack([colours(frame, members), light])
 
-    def _shadow_map(self, frame: Frame) -> np.ndarray:
-        """How deep the key light goes into its box, (h, w) float32, 0 .. 1."""
-        close = look(self._light.outlook, self._bodies, *_places(frame)).close
-        return np.clip(0.5 - (0.5 / np.float32(self._light.reach[2])) * close, 0.0, 1.0)
+    def _shadow_map(self, frame: Frame, groups: Groups) -> np.ndarray:
+        """How close to the key light what it meets is, (h, w) float32 [m]."""
+        return look(self._light.outlook, self._bodies, groups, np.ascontiguousarray(frame.orientation)).close
 
     def _put_lines(self, view: View, cells: tuple[np.ndarray, np.ndarray, np.ndarray] | None) -> None:
         width = self._quality.samples * max(1.0, self._size[1] / 720.0)
@@ -170,7 +165,7 @@ class Renderer:
         rows = [
             (*eye, 0.0),
             (*self._light.towards, 0.0),
-            (1.0 / self._light.pixels[0], 1.0 / self._light.pixels[1], 0.0, 0.0),
+            (1.0 / self._light.pixels[0], 1.0 / self._light.pixels[1], *self._light.pixels),
             *self._about.colour_rows(),
             (width, height, 1.0, -view.near),
             (*-back, 2.0 * slope / height),
@@ -181,7 +176,3 @@ class Renderer:
         ]
         matrices = [(projection @ turn).T.ravel(), self._light.matrix(eye).T.ravel()]  # by columns, as OpenGL has them
         return np.concatenate([*matrices, np.ravel(rows)], dtype=np.float32, casting="same_kind")
-
-
-def _places(frame: Frame) -> tuple[np.ndarray, np.ndarray]:
-    return np.ascontiguousarray(frame.position), np.ascontiguousarray(frame.orientation)

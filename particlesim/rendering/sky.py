@@ -26,8 +26,9 @@ _OWN = 0.30
 # Of more particles than this every second, third ... stands for the others too: the fog is the same.
 _ENOUGH = 200_000
 
-# Steps from cell to cell towards the sky, and to the horizon, of whose light half comes from above it.
-_WAYS = np.array([(x, y, z, 1.0 if z else 0.5) for z in (1, 0) for y in (-1, 0, 1) for x in (-1, 0, 1) if x or y or z])
+# Steps from cell to cell towards the sky, and to the horizon, of whose light half comes from above it; their weights.
+_STEPS = [(x, y, z) for z in (1, 0) for y in (-1, 0, 1) for x in (-1, 0, 1) if x or y or z]
+_WAYS = [(x, y, z, (1.0 if z else 0.5) / 13.0) for x, y, z in _STEPS]
 
 
 class Sky:
@@ -36,10 +37,10 @@ class Sky:
     def __init__(self, size: np.ndarray, outer: np.ndarray) -> None:
         typical = 2.0 * float(np.quantile(outer, 0.9)) if len(outer) else 0.0
         self._cell = max(float(np.max(size)) / _CELLS, typical)
-        # One empty cell more on each side: there the light comes in.
+        # Two empty cells more on each side, layer by layer from below: where light comes in, and where all is light.
         inside = np.ceil(np.asarray(size) / self._cell).astype(np.int64)
-        self._shape = tuple(int(cells) + 3 for cells in inside)
-        self._first = -0.5 * inside * self._cell - self._cell
+        self._shape = tuple(int(cells) + 5 for cells in inside[::-1])
+        self._first = -0.5 * inside * self._cell - 2.0 * self._cell
         # Optical depth that a particle adds to one cell; a giant darkens its own cells, no more.
         self._depth = np.minimum(math.pi * outer**2 / self._cell**2, 2.0)
 
@@ -48,72 +49,80 @@ class Sky:
         fog = np.zeros(self._shape)
         places = np.ascontiguousarray(position)
         _spread(places, self._depth, self._first, self._cell, -(-len(places) // _ENOUGH) or 1, fog)
-        light = np.zeros(self._shape)
-        for x, y, z, weight in _WAYS:
-            _shine(fog, int(x), int(y), int(z), weight / _WAYS[:, 3].sum(), light)
+        # What passes half a cell along the edges of cells, their faces' diagonals and their own.
+        inner = (slice(1, -1),) * 3
+        clear = [np.exp(-0.5 * math.sqrt(square) * fog[inner]) for square in (1, 2, 3)]
+        light = np.ones(self._shape)
+        light[inner] = sum(weight * _shine(clear[x * x + y * y + z * z - 1], (x, y, z)) for x, y, z, weight in _WAYS)
         return _LEAST + (1.0 - _LEAST) * _gather(places, self._depth, self._first, self._cell, light, members)
 
 
 @kernel
 def _cell_of(position, first, cell, i):
-    """The lowest of the eight cells whose middles are about a particle, and its shares of low and high on each axis."""
+    """The lowest of the eight cells whose middles are about a particle, and how far it is on to the next, each axis."""
     x, y, z = (
         (position[i, 0] - first[0]) / cell,
         (position[i, 1] - first[1]) / cell,
         (position[i, 2] - first[2]) / cell,
     )
     a, b, c = math.floor(x), math.floor(y), math.floor(z)
-    x, y, z = x - a, y - b, z - c
-    return (a, b, c), ((1.0 - x, x), (1.0 - y, y), (1.0 - z, z))
+    return (a, b, c), (x - a, y - b, z - c)
+
+
+@kernel
+def _share(way, corner):
+    """Of a particle so far on its way between eight cells, the share of one: three bits, 1 for beyond."""
+    right, up, high = corner & 1, corner >> 1 & 1, corner >> 2
+    return (way[0] if right else 1.0 - way[0]) * (way[1] if up else 1.0 - way[1]) * (way[2] if high else 1.0 - way[2])
+
+
+@kernel
+def _within(cells, corner):
+    """Whether this cell and the seven beyond it are there."""
+    a, b, c = corner
+    return 0 <= a < cells.shape[2] - 1 and 0 <= b < cells.shape[1] - 1 and 0 <= c < cells.shape[0] - 1
 
 
 @kernel
 def _spread(position, depth, first, cell, step, fog):
     """Share the optical depth of each ``step``-th particle, for all, between the eight cells that are about it."""
     for i in range(0, len(position), step):
-        (a, b, c), shares = _cell_of(position, first, cell, i)
-        for corner in range(8):
-            right, up, high = corner & 1, corner >> 1 & 1, corner >> 2
-            if _within(fog, a + right, b + up, c + high):
-                share = shares[0][right] * shares[1][up] * shares[2][high]
-                fog[a + right, b + up, c + high] += share * step * depth[i]
+        lowest, way = _cell_of(position, first, cell, i)
+        if _within(fog, lowest):
+            mine = step * depth[i]
+            for corner in range(8):
+                right, up, high = corner & 1, corner >> 1 & 1, corner >> 2
+                fog[lowest[2] + high, lowest[1] + up, lowest[0] + right] += _share(way, corner) * mine
 
 
 @kernel
-def _within(cells, a, b, c):
-    return 0 <= a < cells.shape[0] and 0 <= b < cells.shape[1] and 0 <= c < cells.shape[2]
-
-
-@kernel
-def _shine(fog, dx, dy, dz, weight, light):
-    """Add to ``light`` what comes through the fog from one direction, cells being visited from there on."""
-    nx, ny, nz = fog.shape
-    length = 0.5 * math.sqrt(float(dx * dx + dy * dy + dz * dz))
-    depth = np.zeros(fog.shape)
-    for c in range(nz - 1, -1, -1) if dz > 0 else range(nz):
-        for j in range(ny):
+def _shine(clear, way):
+    """Share of the light from one direction that comes to each cell, these being visited from there on."""
+    nz, ny, nx = clear.shape
+    dx, dy, dz = way
+    share = np.ones(clear.shape)
+    for k in range(dz, nz):
+        c = nz - 1 - k
+        for j in range(abs(dy), ny):
             b = ny - 1 - j if dy > 0 else j
-            for i in range(nx):
+            for i in range(abs(dx), nx):
                 a = nx - 1 - i if dx > 0 else i
                 p, q, r = a + dx, b + dy, c + dz
-                if 0 <= p < nx and 0 <= q < ny and r < nz:
-                    depth[a, b, c] = depth[p, q, r] + length * (fog[a, b, c] + fog[p, q, r])
-                light[a, b, c] += weight * math.exp(-depth[a, b, c])
+                share[c, b, a] = share[r, q, p] * clear[c, b, a] * clear[r, q, p]
+    return share
 
 
 @kernel
 def _gather(position, depth, first, cell, light, members):
     """The light at each member's place, without the shadow of its own."""
-    out = np.empty(len(members))
+    out = np.ones(len(members))
     for k in range(len(members)):
         i = members[k]
-        (a, b, c), shares = _cell_of(position, first, cell, i)
-        here = 0.0
-        for corner in range(8):
-            right, up, high = corner & 1, corner >> 1 & 1, corner >> 2
-            share = shares[0][right] * shares[1][up] * shares[2][high]
-            # Outside all is light: what flies out of an open world comes into it within a cell, not at once.
-            there = _within(light, a + right, b + up, c + high)
-            here += share * (light[a + right, b + up, c + high] if there else 1.0)
-        out[k] = min(here * math.exp(_OWN * depth[i]), 1.0)
+        lowest, way = _cell_of(position, first, cell, i)
+        if _within(light, lowest):
+            here = 0.0
+            for corner in range(8):
+                right, up, high = corner & 1, corner >> 1 & 1, corner >> 2
+                here += _share(way, corner) * light[lowest[2] + high, lowest[1] + up, lowest[0] + right]
+            out[k] = min(here * math.exp(_OWN * depth[i]), 1.0)
     return out

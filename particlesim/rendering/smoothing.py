@@ -74,62 +74,70 @@ def _contrast(bright, row, contrast):
 def _smooth(image, bright, smooth, first, last):
     height, width = image.shape[0], image.shape[1]
     contrast = np.empty(width, dtype=np.float32)
+    flat, stride = bright.reshape(-1), width + 2
     for row in range(first, last):
         _contrast(bright, row + 1, contrast)
         for column in range(width):
             if contrast[column] > 0.0:
-                share, down, across = _mixture(bright, row + 1, column + 1)
-                down, across = min(max(down - 1, 0), height - 1), min(max(across - 1, 0), width - 1)
+                share, other = _mixture(flat, stride, row + 1, column + 1)
+                down, across = other // stride - 1, other % stride - 1
+                down, across = min(max(down, 0), height - 1), min(max(across, 0), width - 1)
                 for channel in range(3):
-                    own, other = image[row, column, channel], image[down, across, channel]
-                    mixed = own + share * (float(other) - own) + 0.5
+                    own, foreign = image[row, column, channel], image[down, across, channel]
+                    mixed = own + share * (float(foreign) - own) + 0.5
                     smooth[height - 1 - row, column, channel] = np.uint8(mixed)
 
 
 @kernel
-def _mixture(bright, row, column):
-    """How much a pixel takes from the one across the edge, and where that is: row, column."""
-    here = bright[row, column]
-    n, s, e, w = bright[row + 1, column], bright[row - 1, column], bright[row, column + 1], bright[row, column - 1]
-    ne, nw = bright[row + 1, column + 1], bright[row + 1, column - 1]
-    se, sw = bright[row - 1, column + 1], bright[row - 1, column - 1]
+def _mixture(bright, stride, row, column):
+    """How much a pixel takes from the one across the edge, and which that is."""
+    here_at = row * stride + column
+    here = bright[here_at]
+    n, s, e, w = bright[here_at + stride], bright[here_at - stride], bright[here_at + 1], bright[here_at - 1]
+    ne, nw = bright[here_at + stride + 1], bright[here_at + stride - 1]
+    se, sw = bright[here_at - stride + 1], bright[here_at - stride - 1]
     # The edge runs along the direction in which brightness bends less.
     upright = abs(ne - 2.0 * e + se) + 2.0 * abs(n - 2.0 * here + s) + abs(nw - 2.0 * w + sw)
     sideways = abs(ne - 2.0 * n + nw) + 2.0 * abs(e - 2.0 * here + w) + abs(se - 2.0 * s + sw)
     if upright >= sideways:
-        down, across = row + (1 if abs(n - here) >= abs(s - here) else -1), column
-        share = _share(bright, row, column, down, across, 0, 1)
+        across, along = stride if abs(n - here) >= abs(s - here) else -stride, 1
+        back, ahead = column, stride - 1 - column
     else:
-        down, across = row, column + (1 if abs(e - here) >= abs(w - here) else -1)
-        share = _share(bright, row, column, down, across, 1, 0)
+        across, along = 1 if abs(e - here) >= abs(w - here) else -1, stride
+        back, ahead = row, len(bright) // stride - 1 - row
+    share = _share(bright, here_at, across, along, min(back, _FARTHEST), min(ahead, _FARTHEST))
     around = (2.0 * (n + s + e + w) + ne + nw + se + sw) / 12.0
     most, least = max(here, n, s, e, w), min(here, n, s, e, w)
     sticks_out = min(abs(around - here) / (most - least), 1.0)
-    return max(share, _SUBDUED * sticks_out * sticks_out), down, across
+    return max(share, _SUBDUED * sticks_out * sticks_out), here_at + across
 
 
 @kernel
-def _share(bright, row, column, other_row, other_column, step_row, step_column):
-    """How much a pixel takes from the one across the edge: half at the end of a step, none in its middle."""
-    height, width = bright.shape
-    here, there = bright[row, column], bright[other_row, other_column]
+def _share(bright, at, across, along, back, ahead):
+    """How much a pixel takes from the one across the edge: half at the end of a step, none in its middle.
+
+    Along the edge there are so many pixels to look at, ``back`` and ``ahead``.
+    """
+    here, there = bright[at], bright[at + across]
     middle, quarter = 0.5 * (here + there), 0.25 * abs(there - here)
-    nearest, total, rest = 2 * _FARTHEST, 0, 0.0
-    for way in (-1, 1):
-        gone, change = _FARTHEST, 0.0
-        for k in range(1, _FARTHEST + 1):
-            r, c = row + way * k * step_row, column + way * k * step_column
-            p, q = other_row + way * k * step_row, other_column + way * k * step_column
-            if not (0 <= r < height and 0 <= c < width):
-                break
-            change = 0.5 * (bright[r, c] + bright[p, q]) - middle
+    for k in range(1, max(back, ahead) + 1):
+        for way, room in ((-1, back), (1, ahead)):
+            change = _change(bright, at + way * k * along, across, middle) if k <= room else 0.0
             if abs(change) >= quarter:
-                gone = k
-                break
-        total += gone
-        if gone < nearest:
-            nearest, rest = gone, change
-    # Of the two sides only that whose colour ends where the step does gives way to the other.
-    if (rest < 0.0) == (here < middle):
-        return 0.0
-    return max(0.5 - (nearest - 0.5) / (total - 1.0), 0.0)
+                # Of the two sides only that whose colour ends where the step does gives way to the other.
+                if (change < 0.0) == (here < middle):
+                    return 0.0
+                rest = back if way > 0 else ahead
+                total = k + _FARTHEST
+                for n in range(k, rest + 1):
+                    if abs(_change(bright, at - way * n * along, across, middle)) >= quarter:
+                        total = k + n
+                        break
+                return max(0.5 - (k - 0.5) / (total - 1.0), 0.0)
+    return 0.0
+
+
+@kernel
+def _change(bright, at, across, middle):
+    """How much brighter than ``middle`` it is on an edge."""
+    return 0.5 * (bright[at] + bright[at + across]) - middle

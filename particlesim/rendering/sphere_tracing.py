@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 
-from particlesim.jit import kernel
+import numpy as np
 
-# Edge of the squares of the picture that are noted as holding spheres [pixels].
-TILE = 16
+from particlesim.jit import kernel
 
 
 @kernel
 def span(low, high, middle, scale, first, last):
     """The pixels of ``first .. last`` whose middles lie between two lines [m at distance 1]: first, past last."""
-    start = middle + scale * low - 0.5
-    end = middle + scale * high - 0.5
+    return pixels(middle + scale * low - 0.5, middle + scale * high - 0.5, first, last)
+
+
+@kernel
+def pixels(start, end, first, last):
+    """The whole numbers of ``first .. last`` from ``start`` to ``end``: first, past last."""
     # Compared as numbers first: a line may be farther away than an integer can say.
     start = first if start <= first else (last if start >= last else math.ceil(start))
     end = first if end < first else (last if end >= last - 1 else math.floor(end) + 1)
@@ -35,7 +38,7 @@ def trace_disc(x, y, z, radius, window, close):
 
 
 @kernel
-def trace_sphere(i, x, y, z, radius, window, close, owner, tiles):
+def trace_sphere(i, x, y, z, radius, window, close, owner):
     """A sphere before the eye: where the ray (u, v, 1) t meets it first, t^2 (d.d) - 2 t (d.c) + c.c - r^2 = 0."""
     middle_x, middle_y, scale, first, last = window
     power = x * x + y * y + z * z - radius * radius
@@ -43,30 +46,33 @@ def trace_sphere(i, x, y, z, radius, window, close, owner, tiles):
     reach = radius * math.sqrt(y * y + z * z - radius * radius)
     across = z * z - radius * radius
     low, high = span((y * z - reach) / across, (y * z + reach) / across, middle_y, scale, 0, len(close))
-    front = 1.0 / (z - radius)
     across = power - x * x
+    pixel, per_power, per_across = 1.0 / scale, 1.0 / power, 1.0 / across
+    bend = np.float32(math.sqrt(across) * pixel * per_power)
+    slope = np.float32(x * pixel * per_power)
     for row in range(low, high):
-        v = (row + 0.5 - middle_y) / scale
-        w, g = v * y + z, 1.0 + v * v
-        half = math.sqrt(max(x * x * w * w + across * (w * w - g * power), 0.0))
-        start, end = span((x * w - half) / across, (x * w + half) / across, middle_x, scale, first, last)
-        found = False
-        for column in range(start, end):
-            if close[row, column] < front:
-                u = (column + 0.5 - middle_x) / scale
-                b = u * x + w
-                q = (b + math.sqrt(max(b * b - (g + u * u) * power, 0.0))) / power
-                if close[row, column] < q:
-                    close[row, column] = q
-                    owner[row, column] = i
-                    found = True
-        if found:
-            for tile in range(start // TILE, (end - 1) // TILE + 1):
-                tiles[row // TILE, tile] = True
+        v = (row + 0.5 - middle_y) * pixel
+        w = v * y + z
+        half = math.sqrt(max(x * x * w * w + across * (w * w - (1.0 + v * v) * power), 0.0))
+        left = middle_x + scale * (x * w - half) * per_across - 0.5
+        right = middle_x + scale * (x * w + half) * per_across - 0.5
+        # In single precision, by which from these two columns on no digits are lost. The first of the whole row counts,
+        # or the number of strips would be seen.
+        start, end = pixels(left, right, 0, close.shape[1])
+        there = np.float32((w + (start + 0.5 - middle_x) * pixel * x) * per_power)
+        before, beyond = np.float32(start - left), np.float32(right - start)
+        begin = max(start, first)
+        closest, owners = close[row, begin : min(end, last)], owner[row, begin : min(end, last)]
+        for k in range(len(closest)):
+            t = np.float32(begin - start + k)
+            q = there + slope * t + bend * math.sqrt(max((before + t) * (beyond - t), np.float32(0.0)))
+            nearer = closest[k] < q
+            closest[k] = q if nearer else closest[k]
+            owners[k] = i if nearer else owners[k]
 
 
 @kernel
-def trace_sphere_beside(i, x, y, z, radius, window, close, owner, tiles):
+def trace_sphere_beside(i, x, y, z, radius, window, close, owner):
     """A sphere that reaches beside the eye: any pixel may see it. None does from within."""
     middle_x, middle_y, scale, first, last = window
     power = x * x + y * y + z * z - radius * radius
@@ -83,4 +89,3 @@ def trace_sphere_beside(i, x, y, z, radius, window, close, owner, tiles):
                 if close[row, column] < q:
                     close[row, column] = q
                     owner[row, column] = i
-                    tiles[row // TILE, column // TILE] = True
