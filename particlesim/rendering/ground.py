@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from particlesim.jit import kernel
+from particlesim.rendering.cast import EVERYONE
 
 # The shade is told at points a particle's radius apart, and at most at so many along the floor's longer side.
 _POINTS = 192
@@ -33,12 +34,15 @@ class Ground:
         typical = float(np.median(self._radius)) if len(inner) else 0.0
         self._step = max(2.0 * float(max(self._half)) / _POINTS, typical)
 
-    def light(self, position: np.ndarray) -> np.ndarray:
-        """Share of the light that reaches the floor, (b, a) float32, from its corner (-x, -y) to (x, y)."""
+    def light(self, position: np.ndarray, whose: slice | np.ndarray = EVERYONE) -> np.ndarray:
+        """Share of the light that reaches the floor, (b, a) float32, from its corner (-x, -y) to (x, y).
+
+        ``whose`` (m,) particle each of those at ``position`` (m, 3) is an image of (see cast.py).
+        """
         width, depth = (max(1, round(2.0 * half / self._step)) for half in self._half)
         light = np.ones((depth, width))
         corner = np.array([*-self._half, self._height])
-        _shade(np.ascontiguousarray(position), self._radius, corner, 2.0 * self._half, light)
+        _shade(np.ascontiguousarray(position), self._radius[whose], corner, 2.0 * self._half, light)
         return (1.0 - _SKY * (1.0 - light)).astype(np.float32)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from particlesim.rendering import geometry, platform
 from particlesim.rendering.bodies import bodies_of
 from particlesim.rendering.camera import Box, View, subject_box, view_at
+from particlesim.rendering.cast import Cast, cast_of
 from particlesim.rendering.cells import cell_lines
 from particlesim.rendering.colour import ParticleColours
 from particlesim.rendering.ground import Ground
@@ -89,19 +90,20 @@ class Renderer:
         """
         self._settled = settled = self._settled or self._settle(self._first or frame)
         view = view_at(self._scene, frame.time, self._size[0] / self._size[1], settled.subject)
-        groups = grouped(np.ascontiguousarray(frame.position), self._bodies.outer)
+        cast = cast_of(self._scene, self._header, frame, self._bodies)
+        groups = grouped(cast.position, cast.bodies.outer)
         outlook = self._outlook(view)
-        sight = look(outlook, self._bodies, groups, np.ascontiguousarray(frame.orientation))
+        sight = look(outlook, cast.bodies, groups, cast.orientation)
         # While the light looks, what the camera saw is worked up: that leaves a core idle now and then.
-        shadow = self._beside.submit(self._shadow_map, frame, groups)
-        first_row, surfaces = self._put_particles(frame, settled.colours, outlook, sight)
+        shadow = self._beside.submit(self._shadow_map, cast, groups)
+        first_row, surfaces = self._put_particles(frame, cast, settled.colours, outlook, sight)
         self._put_lines(view, cells)
         picture = self._bridge.Picture(
             view_block=self._view_block(view),
             shadow=shadow.result(),
             first_row=first_row,
             surfaces=surfaces,
-            ground=np.ones((1, 1)) if self._ground is None else self._ground.light(frame.position),
+            ground=np.ones((1, 1)) if self._ground is None else self._ground.light(cast.position, cast.whose),
         )
         drawn = self._canvas.draw(picture)
         # OpenGL's first row is the lowest, and it has a fourth channel.
@@ -123,24 +125,24 @@ class Renderer:
         return Outlook(axes, view.pose[:3, 3], False, 0.5 * self._drawn_size[1] / slope, self._drawn_size)
 
     def _put_particles(
-        self, frame: Frame, colours: ParticleColours, outlook: Outlook, sight: Sight
+        self, frame: Frame, cast: Cast, colours: ParticleColours, outlook: Outlook, sight: Sight
     ) -> tuple[np.ndarray, np.ndarray]:
         """Tiles into the layers of spheres and hulls; what is seen at each pixel, and its table (see Picture)."""
-        surfaces = surfaces_of(sight, self._bodies)
+        surfaces = surfaces_of(sight, cast.bodies)
         self._spheres.put(TILE * np.argwhere(surfaces.balls)[:, ::-1])
         self._hulls.put(TILE * np.argwhere(surfaces.hulls)[:, ::-1])
-        paint = self._paint(frame, colours, surfaces.seen)
-        place = np.ascontiguousarray(frame.position), np.ascontiguousarray(frame.orientation)
-        return surfaces.first_row, table_of(surfaces, self._bodies, outlook, *place, paint)
+        paint = self._paint(frame, cast, colours, surfaces.seen)
+        return surfaces.first_row, table_of(surfaces, cast.bodies, outlook, cast.position, cast.orientation, paint)
 
-    def _paint(self, frame: Frame, colours: ParticleColours, members: np.ndarray) -> np.ndarray:
-        """Linear colour, and share of the sky's light, of some particles, (k, 4) float64."""
-        light = self._sky.light(frame.position, members) if self._sky is not None else np.ones(len(members))
-        return np.column_stack([colours(frame, members), light])
+    def _paint(self, frame: Frame, cast: Cast, colours: ParticleColours, members: np.ndarray) -> np.ndarray:
+        """Linear colour, and share of the sky's light, of some of the cast, (k, 4) float64."""
+        sky = self._sky
+        light = np.ones(len(members)) if sky is None else sky.light(cast.position, members, cast.whose)
+        return np.column_stack([colours(frame, cast.particles(members)), light])
 
-    def _shadow_map(self, frame: Frame, groups: Groups) -> np.ndarray:
+    def _shadow_map(self, cast: Cast, groups: Groups) -> np.ndarray:
         """How close to the key light what it meets is, (h, w) float32 [m]."""
-        return look(self._light.outlook, self._bodies, groups, np.ascontiguousarray(frame.orientation)).close
+        return look(self._light.outlook, cast.bodies, groups, cast.orientation).close
 
     def _put_lines(self, view: View, cells: tuple[np.ndarray, np.ndarray, np.ndarray] | None) -> None:
         width = self._quality.samples * max(1.0, self._size[1] / 720.0)

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from particlesim.jit import kernel
+from particlesim.rendering.cast import EVERYONE
 
 # Cells along the world's longest side, if particles are not wider than these are.
 _CELLS = 32
@@ -44,17 +45,21 @@ class Sky:
         # Optical depth that a particle adds to one cell; a giant darkens its own cells, no more.
         self._depth = np.minimum(math.pi * outer**2 / self._cell**2, 2.0)
 
-    def light(self, position: np.ndarray, members: np.ndarray) -> np.ndarray:
-        """Share of the sky's light (k,) float64 that reaches ``members`` (k,) of the particles at ``position``."""
+    def light(self, position: np.ndarray, members: np.ndarray, whose: slice | np.ndarray = EVERYONE) -> np.ndarray:
+        """Share of the sky's light (k,) float64 that reaches ``members`` (k,) of those at ``position`` (m, 3).
+
+        ``whose`` (m,) particle each is an image of (see cast.py).
+        """
+        depth = self._depth[whose]
         fog = np.zeros(self._shape)
         places = np.ascontiguousarray(position)
-        _spread(places, self._depth, self._first, self._cell, -(-len(places) // _ENOUGH) or 1, fog)
+        _spread(places, depth, self._first, self._cell, -(-len(places) // _ENOUGH) or 1, fog)
         # What passes half a cell along the edges of cells, their faces' diagonals and their own.
         inner = (slice(1, -1),) * 3
         clear = [np.exp(-0.5 * math.sqrt(square) * fog[inner]) for square in (1, 2, 3)]
         light = np.ones(self._shape)
         light[inner] = sum(weight * _shine(clear[x * x + y * y + z * z - 1], (x, y, z)) for x, y, z, weight in _WAYS)
-        return _LEAST + (1.0 - _LEAST) * _gather(places, self._depth, self._first, self._cell, light, members)
+        return _LEAST + (1.0 - _LEAST) * _gather(places, depth, self._first, self._cell, light, members)
 
 
 @kernel
