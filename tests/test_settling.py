@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from particlesim.impacts.cluster import COLUMNS, LEVER_I, handed_down
 from particlesim.simulation import Simulation
 from tests.worlds import listed, scene
 
@@ -86,6 +87,27 @@ def test_a_heap_of_all_shapes_calms_down():
     assert sim.ledger.kinetic < 0.02 * max(ledger.kinetic for ledger in ledgers)
     assert largest_overlap(ledgers[-5:]) < 1e-4 * 0.2
     assert momentum_unaccounted(sim, ledgers) < 1e-12
+
+
+def test_a_heap_thrown_together_is_worked_through():
+    """The bound on the work is reached in a few moments only."""
+    sim, ledgers = followed(heap(6, size=(0.6, 0.6, 2.0)), 2, 40)
+    assert only_falls(ledgers)
+    assert sim.ledger.unresolved < 0.01 * sim.steps
+
+
+def test_forces_go_to_the_nearest_points_of_the_same_contact():
+    """The corners of a patch come in any order, and may be fewer or more than before; no force is lost."""
+    point = np.zeros((4, COLUMNS))
+    point[:, LEVER_I] = 5.0, 1.0, 2.0, 1.1
+    contact, before = np.array([7, 3, 3, 9]), np.array([3, 3, 3, 8, 7])
+    lever = np.zeros((5, 3))
+    lever[:, 0] = 2.1, 1.2, 0.8, 5.0, -4.0
+    order = np.argsort(contact, kind="stable")
+    first = np.searchsorted(contact, before, sorter=order)
+    last = np.searchsorted(contact, before, side="right", sorter=order)
+    forces = handed_down(point, order, first, last, lever, np.array([10.0, 20.0, 30.0, 40.0, 50.0]))
+    assert forces.tolist() == [50.0, 50.0, 10.0, 0.0]
 
 
 def test_a_heap_is_the_same_for_every_broad_phase_and_number_of_threads():

@@ -48,6 +48,10 @@ COLUMNS = 23
 # Contact points are as far ahead as bodies come that are this much faster than they are thought to be.
 FASTER = 2.0
 
+# The fraction of a neighbour's speed that a body is expected to take on. With FASTER nearly all are foreseen; the rest
+# costs a second look at everything.
+_HANDED_ON = 0.3
+
 # Inclined by more than this [sine of the angle], features are no patch, however fast they turn.
 _MOST_TILT = 0.2
 
@@ -235,6 +239,20 @@ def surface_paces(constants, state, spin):
 
 
 @kernel
+def expected_paces(pace, lists, least):
+    """How fast surfaces that move at ``pace`` may become (n,) [m/s]: ``least`` faster, or as neighbours push them."""
+    particle, start, other = lists.particle, lists.start, lists.other
+    expected = np.empty(len(pace))
+    for p in range(len(pace)):
+        i = particle[p]
+        expected[i] = pace[i]
+        for near in range(start[p], start[p + 1]):
+            expected[i] = max(expected[i], _HANDED_ON * pace[particle[other[near]]])
+        expected[i] += least
+    return expected
+
+
+@kernel
 def walk(constants, state, period, position, orientation, way):
     """Add to ``way`` (n,) how far surfaces are from where they were at ``position`` and ``orientation`` [m].
 
@@ -322,3 +340,22 @@ def find_cluster(table, world, constants, state, spin, lists, duration, pace, wa
                 standing[i] = LOOSE
                 standing[j] = LOOSE if standing[j] != FREE else FREE
     return partner[:size], point[:size]
+
+
+@kernel
+def handed_down(point, order, first, last, lever, force):
+    """Forces (m,) at contact points: each ``force`` of before at the point that is nearest to where it was.
+
+    Force ``k`` had the ``lever`` (k, 3), the LEVER_I of its point; its contact now has the points
+    ``order[first[k]:last[k]]``.
+    """
+    forces = np.zeros(len(point))
+    for k in range(len(force)):
+        nearest, least = -1, np.inf
+        for place in range(first[k], last[k]):
+            way = sub(column(point, order[place], LEVER_I), row(lever, k))
+            if dot(way, way) < least:
+                nearest, least = order[place], dot(way, way)
+        if nearest >= 0:
+            forces[nearest] += force[k]
+    return forces

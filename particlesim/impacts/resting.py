@@ -9,8 +9,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from particlesim.constants import FREE, MAX_MANIFOLD, RESTING_DROP
-from particlesim.impacts.cluster import APART, FASTER, find_cluster, surface_paces, walk
+from particlesim.constants import FREE, RESTING_DROP
+from particlesim.impacts.cluster import (
+    APART,
+    FASTER,
+    LEVER_I,
+    expected_paces,
+    find_cluster,
+    handed_down,
+    surface_paces,
+    walk,
+)
 from particlesim.impacts.neighbours import Neighbours
 from particlesim.impacts.settling import settle
 from particlesim.motion import spins
@@ -35,7 +44,8 @@ class Resting:
         count = len(constants.mass)
         self._table, self._world, self._constants, self._state = table, world, constants, state
         self._gravity = float(np.linalg.norm(world.gravity))
-        self._keys, self._forces = np.empty(0, dtype=np.int64), np.empty(0)
+        # Of the last stretch: a number for the partners at each contact point, its levers and forces [N].
+        self._contact, self._lever, self._force = np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty(0)
         self._inradius = float(constants.inradius.mean()) if count else 0.0
         self._fastest = 0.0  # of the surfaces of what is pressed [m/s]
         self._last_bounces = self._time_of_last_bounces()
@@ -77,7 +87,9 @@ class Resting:
         self.wall_impulse, self.virial, self.unresolved = np.zeros(6), 0.0, False
         self._keep_clearance(neighbours)
         spin = spins(constants, state)
-        pace = surface_paces(constants, state, spin) + _HASTE * self._gravity * duration
+        pace = expected_paces(
+            surface_paces(constants, state, spin), neighbours.lists, _HASTE * self._gravity * duration
+        )
         before = state.velocity.copy(), state.angular_momentum.copy()
         for look in range(1, _MAX_LOOKS + 1):
             partner, point = find_cluster(
@@ -86,12 +98,15 @@ class Resting:
             )  # fmt: skip
             if not len(partner):
                 return
-            keys = self._keys_of(partner)
-            impulse = self._forces_of(keys) * duration
-            pressed, done = settle(self._world, constants, state, spin, partner, point, duration, impulse, acceleration)
+            contact = partner[:, 0] * (len(pace) + 6) + partner[:, 1] + 6
+            impulse = self._forces_of(contact, point) * duration
+            pressed, done, steady = settle(
+                self._world, constants, state, spin, partner, point, duration, impulse, acceleration
+            )
             self._held = np.flatnonzero(pressed)
             self._before = before[0][self._held], before[1][self._held]
-            self._keys, self._forces = keys, impulse / duration
+            self._contact, self._force = contact, steady / duration
+            self._lever = point[:, LEVER_I : LEVER_I + 3].copy()
             reached = surface_paces(constants, state, spins(constants, state))
             self._fastest = float(reached[self._held].max(initial=0.0))
             foreseen = bool((reached <= FASTER * pace).all())
@@ -117,19 +132,9 @@ class Resting:
         if len(self._held):
             self._state.velocity[self._held], self._state.angular_momentum[self._held] = self._before
 
-    def _keys_of(self, partner: np.ndarray) -> np.ndarray:
-        """A number for each contact point that stays the same from stretch to stretch."""
-        count = len(self._constants.mass) + 6
-        contact = partner[:, 0] * count + partner[:, 1] + 6
-        starts = np.flatnonzero(np.diff(contact, prepend=-1))
-        within = np.arange(len(contact)) - np.repeat(starts, np.diff(starts, append=len(contact)))
-        return contact * MAX_MANIFOLD + within
-
-    def _forces_of(self, keys: np.ndarray) -> np.ndarray:
+    def _forces_of(self, contact: np.ndarray, point: np.ndarray) -> np.ndarray:
         """The forces [N] that these contact points had in the stretch before; 0 for new ones."""
-        if not len(self._keys):
-            return np.zeros(len(keys))
-        order = np.argsort(self._keys)
-        place = np.minimum(np.searchsorted(self._keys, keys, sorter=order), len(order) - 1)
-        known = self._keys[order[place]] == keys
-        return np.where(known, self._forces[order[place]], 0.0)
+        order = np.argsort(contact, kind="stable")
+        first = np.searchsorted(contact, self._contact, sorter=order)
+        last = np.searchsorted(contact, self._contact, side="right", sorter=order)
+        return handed_down(point, order, first, last, self._lever, self._force)
