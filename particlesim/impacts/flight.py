@@ -181,9 +181,11 @@ class Flight:
         where = self._where(log)[:-1]
         neighbours, count = self._neighbours, len(islands.start) - 1
         meetings = met, times, self._first_met, islands.start, islands.member
-        parts = Crew(_ISLAND * count).each(
+        crew = Crew(_ISLAND * count)
+        parts = crew.each(
             lambda _, first, last: run_islands(*where, neighbours.lists, *meetings, duration, self._tally, first, last),
             count,
+            4 * crew.threads,
         )
         log = extended(self._course, log, [piece for piece, _, _ in parts], [whose for _, whose, _ in parts])
         return log, sum(left for _, _, left in parts)

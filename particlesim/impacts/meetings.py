@@ -208,7 +208,8 @@ def _met(
     """Those of the pairs that meet, and when, with the times of -1 filled in (see ``_look_closer``)."""
     arguments = pairs, normals, slots, times, duration
     crew = Crew(_LOOK * len(pairs))
-    crew.each(lambda _, first, last: _look_closer(*where, *arguments, first, last), len(pairs))
+    # Some pairs take far longer than others: threads that are done take on more.
+    crew.each(lambda _, first, last: _look_closer(*where, *arguments, first, last), len(pairs), 4 * crew.threads)
     meet = times < np.inf
     return pairs[meet], times[meet]
 
