@@ -54,6 +54,11 @@ class Header:
     mass: np.ndarray
     inertia: np.ndarray
 
+    @property
+    def radius(self) -> np.ndarray:
+        """Of the bounding spheres, (n,) [m]."""
+        return np.array([shape.radius for shape in self.shapes])[self.shape] * self.size
+
 
 @dataclass(frozen=True)
 class Frame:

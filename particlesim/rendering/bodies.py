@@ -41,7 +41,7 @@ def bodies_of(header: Header) -> Bodies:
     edges = [(left, right) for hull in shapes for _, _, left, right in hull.edges]
     return Bodies(
         inner=np.array([hull.inradius for hull in shapes])[shape] * header.size,
-        outer=np.array([hull.radius for hull in shapes])[shape] * header.size,
+        outer=header.radius,
         size=np.ascontiguousarray(header.size, dtype=np.float64),
         shape=np.ascontiguousarray(shape, dtype=np.int64),
         first_plane=np.cumsum([0, *(len(hull.faces) for hull in shapes)]),

@@ -96,7 +96,7 @@ def _reach(scene: Scene, header: Header, first: Frame, world: Box) -> Box:
 
     A few that fly off for good do not make all others small.
     """
-    radius = np.array([shape.radius for shape in header.shapes])[header.shape] * header.size
+    radius = header.radius
     lower, upper = _extent(first.position, radius)
     gravity = np.asarray(scene.world.gravity)
     for time in np.linspace(0.0, scene.duration, _GLANCES)[1:]:

@@ -34,7 +34,7 @@ class Cast(NamedTuple):
 def cast_of(scene: Scene, header: Header, frame: Frame, bodies: Bodies) -> Cast:
     """The particles of a frame, and their images through the faces of a periodic world that they reach through."""
     position, orientation = np.ascontiguousarray(frame.position), np.ascontiguousarray(frame.orientation)
-    periodic = np.array([boundary == "periodic" for boundary in scene.world.boundary])
+    periodic = np.array(scene.world.boundary) == "periodic"
     if not periodic.any():
         return Cast(position, orientation, bodies, EVERYONE)
     size = np.asarray(scene.world.size)

@@ -106,9 +106,8 @@ def _impact_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, fl
     edges = np.asarray(scene.world.size)
     volume = float(edges.prod())
     speed = float(np.linalg.norm(first.velocity, axis=1).mean()) if len(first.velocity) else 0.0
-    radius = np.array([shape.radius for shape in header.shapes])[header.shape] * header.size
-    cross_section = math.pi * float(np.mean(4.0 * radius**2)) if len(radius) else 0.0
-    walls = np.array([boundary == "wall" for boundary in scene.world.boundary])
+    cross_section = math.pi * float(np.mean(4.0 * header.radius**2)) if len(header.size) else 0.0
+    walls = np.array(scene.world.boundary) == "wall"
     rate = math.sqrt(2.0) * cross_section * len(header.size) / volume + 0.5 * float((walls / edges).sum())
     return 0.0, max(1.0, round(2.0 * rate * speed * scene.duration))
 

@@ -114,35 +114,38 @@ def _put_lines(bodies, shape, hull):
 
 
 @kernel
-def _row(hull, left, right, row, first, last):
-    """The pixels of a row whose middles see a hull: the first, and one past the last."""
+def _put_outline(i, x, y, z, m, bodies, parallel, window, hull):
+    """Fill in sides and lines of a hull: how many sides are looked at, how many left lines, the first right one."""
+    count = _put_sides(i, x, y, z, m, bodies, parallel, window, hull)
+    left, right = _put_lines(bodies, bodies.shape[i], hull)
+    return count, left, right
+
+
+@kernel
+def _put_row(hull, outline, row, first, last):
+    """Fill in how close the planes are in a row; the pixels whose middles see the hull: the first, past the last."""
+    count, left, right = outline
     start, end = -np.inf, np.inf
     for line in range(left):
         start = max(start, hull.lines[line, 0] + hull.lines[line, 1] * row)
     for line in range(right, len(hull.lines)):
         end = min(end, hull.lines[line, 0] + hull.lines[line, 1] * row)
-    return pixels(start, end, first, last) if start <= end else (first, first)
-
-
-@kernel
-def _put_here(hull, count, row):
-    """Fill in how close the planes are in a row."""
-    for k in range(count):
+    begin, beyond = pixels(start, end, first, last) if start <= end else (first, first)
+    for k in range(count if begin < beyond else 0):
         f = hull.bound[k]
         hull.here[k, 0], hull.here[k, 1] = hull.sides[f, 1] * row + hull.sides[f, 2], hull.sides[f, 0]
+    return begin, beyond
 
 
 @kernel
 def trace_hull(i, x, y, z, m, bodies, window, box, hull, close, owner, face):
     """A hull before the eye."""
-    count = _put_sides(i, x, y, z, m, bodies, False, window, hull)
-    left, right = _put_lines(bodies, bodies.shape[i], hull)
+    outline = _put_outline(i, x, y, z, m, bodies, False, window, hull)
     for row in range(box[0], box[1]):
-        start, end = _row(hull, left, right, row, box[2], box[3])
-        _put_here(hull, count if start < end else 0, row)
+        start, end = _put_row(hull, outline, row, box[2], box[3])
         for column in range(start, end):
             most, nearest = np.inf, 0
-            for k in range(count):
+            for k in range(outline[0]):
                 q = hull.here[k, 0] + hull.here[k, 1] * column
                 if q < most:
                     most, nearest = q, k
@@ -177,13 +180,11 @@ def trace_hull_beside(i, x, y, z, m, bodies, window, hull, close, owner, face):
 @kernel
 def cast_hull(i, x, y, z, m, bodies, window, box, hull, close):
     """A hull in the light hides it from what is behind its rear."""
-    count = _put_sides(i, x, y, z, m, bodies, True, window, hull)
-    left, right = _put_lines(bodies, bodies.shape[i], hull)
+    outline = _put_outline(i, x, y, z, m, bodies, True, window, hull)
     for row in range(box[0], box[1]):
-        start, end = _row(hull, left, right, row, box[2], box[3])
-        _put_here(hull, count if start < end else 0, row)
+        start, end = _put_row(hull, outline, row, box[2], box[3])
         for column in range(start, end):
             rear = -np.inf
-            for k in range(count):
+            for k in range(outline[0]):
                 rear = max(rear, hull.here[k, 0] + hull.here[k, 1] * column)
             close[row, column] = max(close[row, column], rear)
