@@ -142,6 +142,8 @@ class Trajectory:
             self._first = self._file[0] if len(self._file) else None
             if self._first is None or _LOG + "scene" not in self._first.log:
                 raise TrajectoryError(f"{path}: not written by particlesim, or without frames")
+            if _IMPACTS not in self._first.log:
+                raise TrajectoryError(f"{path}: written by an older particlesim; simulate its scene again")
             self.header = _read_header(self._first)
         except BaseException:
             self._file.close()

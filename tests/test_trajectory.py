@@ -93,3 +93,9 @@ def test_other_files_are_refused_in_one_line(tmp_path):
         file.append(gsd.hoomd.Frame())
     with pytest.raises(TrajectoryError, match="not written by particlesim"):
         Trajectory(tmp_path / "other.gsd")
+    with gsd.hoomd.open(str(tmp_path / "old.gsd"), "w") as file:
+        frame = gsd.hoomd.Frame()
+        frame.log["particlesim/scene"] = np.zeros(1, dtype=np.uint8)
+        file.append(frame)
+    with pytest.raises(TrajectoryError, match="older particlesim"):
+        Trajectory(tmp_path / "old.gsd")
