@@ -56,15 +56,16 @@ def test_a_ball_at_rest_is_sent_off_by_one_that_hits_it():
     assert (np.abs(sim.particles.velocity[:, 2]) < 5e-3).all()
 
 
-def test_a_heap_of_balls_comes_to_rest():
+# Without friction one that has room on the floor slides for ever, and what stands on a ridge falls off late: with these
+# seeds there is neither.
+@pytest.mark.parametrize("seed", [10, 12, 17])
+def test_a_heap_of_balls_comes_to_rest(seed):
     balls = {"shape": "sphere", "count": 20, "size": 0.3, "restitution": 0.5}
-    # Without friction one that has room on the floor slides for ever, and what stands on a ridge falls off late: with
-    # this seed there is neither.
-    sim, energies = settled(scene(balls, size=(1, 1, 2), gravity=GRAVITY, restitution=0.5, seed=1), 4, 40)
+    sim, energies = settled(scene(balls, size=(1, 1, 2), gravity=GRAVITY, restitution=0.5, seed=seed), 4, 40)
     assert only_falls(energies)
-    assert sim.ledger.kinetic <= 1e-9 * energies[-1]
+    assert sim.ledger.kinetic <= 1e-15 * energies[-1]
     assert sim.ledger.largest_overlap < 1e-4 * 0.3
     assert sim.ledger.unresolved == 0
     resting = sim.particles.position.copy()
     sim.run(duration=0.5)
-    assert np.allclose(sim.particles.position, resting, rtol=0, atol=1e-6)
+    assert np.allclose(sim.particles.position, resting, rtol=0, atol=1e-9)
