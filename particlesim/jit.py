@@ -18,7 +18,7 @@ from typing import Any
 import numba
 from numba.core import cgutils, types
 from numba.core.imputils import impl_ret_untracked
-from numba.extending import intrinsic
+from numba.extending import intrinsic, models, register_model
 from numba.np.arrayobj import make_array
 
 _PACKAGE = Path(__file__).parent
@@ -69,26 +69,64 @@ def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False) 
         config.CACHE_DIR = elsewhere
 
 
-def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
-    """An array, or a tuple with arrays in it, without what counts its references."""
+class _Uncounted(types.Array):
+    """The type of an array that somebody else holds: references to it, or to parts of it, are not counted."""
+
+    def __init__(self, array: types.Array) -> None:
+        name = f"uncounted {array.name}"
+        super().__init__(array.dtype, array.ndim, array.layout, not array.mutable, name, array.aligned)
+
+    def copy(self, dtype: Any = None, ndim: Any = None, layout: Any = None, readonly: Any = None) -> Any:
+        """The type of a part, which numba asks for with the number of its axes, or of a new array like this one."""
+        kind: Any = super().copy(dtype, ndim, layout, readonly)
+        return kind if ndim is None else _Uncounted(kind)
+
+
+@register_model(_Uncounted)
+class _UncountedModel(models.StructModel):
+    """An array as numba lays it out, but that what counts its references is a mere address."""
+
+    def __init__(self, manager: Any, kind: Any) -> None:
+        counted = models.ArrayModel(manager, kind)
+        members = dict(zip(counted._fields, counted._members, strict=True))  # the way numba's own code reads it
+        members["meminfo"] = types.voidptr
+        super().__init__(manager, kind, list(members.items()))
+
+
+def _uncounted_type(kind: Any) -> Any:
+    """The type of an array, or of a tuple with arrays in it, that is not counted."""
     if isinstance(kind, types.Array):
-        array = make_array(kind)(context, builder, value=value)
-        array.meminfo = cgutils.get_null_value(array.meminfo.type)
-        array.parent = cgutils.get_null_value(array.parent.type)
-        return array._getvalue()  # the way numba's own code reads it
+        return _Uncounted(kind)
     if isinstance(kind, types.BaseTuple):
         elements: Any = kind
-        for k, element in enumerate(elements):
-            changed = _without_owner(context, builder, element, builder.extract_value(value, k))
-            value = builder.insert_value(value, changed, k)
+        elements = [_uncounted_type(element) for element in elements]
+        return types.BaseTuple.from_types(elements, getattr(kind, "instance_class", None))
+    return kind
+
+
+def _uncounted(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    """The value, of type ``kind``, as its uncounted type has it."""
+    if isinstance(kind, types.Array):
+        array, bare = make_array(kind)(context, builder, value=value), make_array(_Uncounted(kind))(context, builder)
+        for name in ("nitems", "itemsize", "data", "shape", "strides"):
+            setattr(bare, name, getattr(array, name))
+        bare.meminfo = cgutils.get_null_value(array.meminfo.type)
+        bare.parent = cgutils.get_null_value(array.parent.type)
+        return bare._getvalue()
+    if isinstance(kind, types.BaseTuple):
+        kinds: Any = kind
+        elements = [_uncounted(context, builder, k, builder.extract_value(value, i)) for i, k in enumerate(kinds)]
+        return context.make_tuple(builder, _uncounted_type(kind), elements)
     return value
 
 
 def _borrow(typing_context: Any, thing: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return impl_ret_untracked(context, builder, thing, _without_owner(context, builder, thing, arguments[0]))
+    result = _uncounted_type(thing)
 
-    return thing(thing), generate
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return impl_ret_untracked(context, builder, result, _uncounted(context, builder, thing, arguments[0]))
+
+    return result(thing), generate
 
 
 def _same(thing: Any) -> Any:
@@ -99,5 +137,6 @@ _config: Any = numba.config
 
 # Inside a kernel: an array or tuple (of tuples) of arrays that came as an argument, whose references are not counted
 # from here on. Counting is atomic: handing a struct of arrays to a function takes longer than moving a particle, and
-# threads that count the same arrays wait for each other. The caller of the kernel holds the arrays meanwhile.
+# threads that count the same arrays wait for each other. The caller of the kernel holds the arrays meanwhile; neither
+# they nor parts of them may be returned.
 borrowed: Any = _same if _config.DISABLE_JIT else intrinsic(_borrow)

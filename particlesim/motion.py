@@ -67,6 +67,14 @@ def spin_of(turn, momentum, moments):
 
 
 @kernel
+def spin_rate(turn, momentum, moments):
+    """How fast a body turns [rad/s]; one without preferred axis turns about its angular momentum."""
+    if _unique_axis(moments) == 3:
+        return norm(momentum) / moments[0]
+    return norm(spin_of(turn, momentum, moments))
+
+
+@kernel
 def particle_spin(constants, state, i):
     """Angular velocity of particle ``i``, world axes [rad/s]."""
     return spin_of(row4(state.orientation, i), row(state.angular_momentum, i), row(constants.inertia, i))

@@ -15,6 +15,7 @@ from particlesim.impacts.sieve import grown
 from particlesim.jit import borrowed, kernel
 from particlesim.motion import spin_of
 from particlesim.narrow_phase.contacts import wall_as_partner, wall_of_partner
+from particlesim.narrow_phase.gjk import NO_CORNERS
 from particlesim.narrow_phase.hull_hull import hull_separation
 from particlesim.narrow_phase.manifold import hull_patch
 from particlesim.narrow_phase.pair import nearest_image, pair_contact
@@ -118,7 +119,9 @@ def _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps
     if table.kind[shape_i] == HULL and table.kind[shape_j] == HULL:
         matrix_i, matrix_j = matrix_of(turn_i), matrix_of(turn_j)
         border = _BORDER * min(constants.inradius[i], constants.inradius[j])
-        gap, normal, middle = hull_separation(table, shape_i, size_i, matrix_i, shape_j, size_j, matrix_j, offset)
+        gap, normal, middle, _ = hull_separation(
+            table, shape_i, size_i, matrix_i, shape_j, size_j, matrix_j, offset, NO_CORNERS
+        )
         if gap <= reach:
             count = hull_patch(
                 table, shape_i, size_i, matrix_i, shape_j, size_j, matrix_j,

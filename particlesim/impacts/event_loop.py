@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from particlesim.constants import MAX_IMPACTS, MAX_MANIFOLD, MAX_SLOW_IMPACTS, SIMULTANEOUS
+from particlesim.constants import MAX_IMPACTS, MAX_SLOW_IMPACTS, SIMULTANEOUS
 from particlesim.impacts.course import NOTHING_MET, PIECE, UNCHAINED, path_of_state, write_piece
 from particlesim.impacts.next_impact import body_of, later, pair_meets, wall_meets
 from particlesim.impacts.response import NOTHING, STRUCK, answer, let_go
@@ -15,6 +15,7 @@ from particlesim.impacts.sieve import grown
 from particlesim.impacts.two_spheres import answer_two, meet_alone
 from particlesim.jit import borrowed, kernel
 from particlesim.narrow_phase.contacts import wall_as_partner
+from particlesim.narrow_phase.gjk import NO_CORNERS
 from particlesim.vec import put, put4, row
 
 
@@ -57,7 +58,9 @@ def _foretell(table, world, constants, state, course, lists, whom, done, soonest
         one, on, two, upon = body, path, body_j, path_j
         if j < i:
             one, on, two, upon = body_j, path_j, body, path
-        time = pair_meets(table, world, kind[one[0]], one, on, kind[two[0]], two, upon, duration - now, points)
+        time = pair_meets(
+            table, world, kind[one[0]], one, on, kind[two[0]], two, upon, duration - now, NO_CORNERS, points
+        )
         if soonest <= time < math.inf:
             heapq.heappush(heap, (now + time, min(i, j), max(i, j), stamp[i] + stamp[j]))
     for wall in range(6):
@@ -178,6 +181,7 @@ def run_islands(
     member,
     duration,
     tally,
+    points,
     first,
     last,
 ):
@@ -190,9 +194,8 @@ def run_islands(
     """
     table, world, constants, state, course = borrowed((table, world, constants, state, course))
     lists, met, times, first_met = borrowed((lists, met, times, first_met))
-    edges, member, tally = borrowed((edges, member, tally))
+    edges, member, tally, points = borrowed((edges, member, tally, points))
     stamp, head = course.stamp, course.head
-    points = np.empty((MAX_MANIFOLD, 3))
     contacts, whom = np.empty((64, 2), dtype=np.int64), np.empty(128, dtype=np.int64)
     piece, particle = np.empty((256, PIECE)), np.empty((256, 1), dtype=np.int64)
     pieces = unfinished = 0

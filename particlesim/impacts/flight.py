@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from particlesim.constants import LONGEST_STRETCH, MAX_HALVINGS, MAX_ROUNDS, SPHERE, WALL
+from particlesim.constants import LONGEST_STRETCH, MAX_HALVINGS, MAX_MANIFOLD, MAX_ROUNDS, SPHERE, WALL
 from particlesim.crew import Crew
 from particlesim.impacts.course import Log, empty_log, extended, forget, new_course, rewind
 from particlesim.impacts.event_loop import run_islands
@@ -183,7 +183,9 @@ class Flight:
         meetings = met, times, self._first_met, islands.start, islands.member
         crew = Crew(_ISLAND * count)
         parts = crew.each(
-            lambda _, first, last: run_islands(*where, neighbours.lists, *meetings, duration, self._tally, first, last),
+            lambda _, first, last: run_islands(
+                *where, neighbours.lists, *meetings, duration, self._tally, np.empty((MAX_MANIFOLD, 3)), first, last
+            ),
             count,
             4 * crew.threads,
         )

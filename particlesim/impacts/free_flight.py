@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from particlesim.jit import borrowed, kernel
-from particlesim.motion import free_path, spin_of
+from particlesim.motion import free_path, spin_rate
 from particlesim.narrow_phase.pair import nearest_image
 from particlesim.vec import dot, norm, put, put4, row, row4, sub, vector
 
@@ -85,7 +85,7 @@ def paces(constants, state, world, out, rows, first, last):
             fastest = max(fastest, speed2)
             speed = math.sqrt(speed2)
             if dot(own, own) > 0.0:
-                speed += norm(spin_of(row4(orientation, i), own, row(inertia, i))) * radius[i]
+                speed += spin_rate(row4(orientation, i), own, row(inertia, i)) * radius[i]
             pace += (speed / radius[i]) ** 2
             pull += g / radius[i]
         out[block, 0], out[block, 1] = pace, pull

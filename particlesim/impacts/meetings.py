@@ -11,10 +11,11 @@ from particlesim.crew import Crew
 from particlesim.impacts.course import Course, Log, path_of_piece, path_of_state
 from particlesim.impacts.neighbours import Neighbours, around_of, far_apart
 from particlesim.impacts.next_impact import body_of, later, pair_meets, wall_meets
-from particlesim.impacts.sieve import balls, free_way, grown, sieve, sieve_walls
+from particlesim.impacts.sieve import balls, free_way, sieve, sieve_walls
 from particlesim.impacts.time_of_impact import stays_apart
 from particlesim.jit import borrowed, kernel
 from particlesim.narrow_phase.contacts import wall_of_partner
+from particlesim.narrow_phase.gjk import NO_CORNERS
 from particlesim.narrow_phase.pair import nearest_image, pair_separation
 from particlesim.state import Constants, ShapeTable, State, World
 from particlesim.vec import along, norm, put, row, scaled, sub
@@ -45,7 +46,7 @@ def _path_at(log, state, course, constants, i, piece, time):
 
 
 @kernel(inline=True)
-def _first_meeting(table, world, constants, state, course, log, i, j, duration, points):
+def _first_meeting(table, world, constants, state, course, log, i, j, duration, corners, points):
     """When particles i and j first meet, whatever else they meet meanwhile; inf if they do not."""
     piece_i, piece_j = course.head[i], course.head[j]
     body_i, body_j = body_of(constants, i), body_of(constants, j)
@@ -56,7 +57,9 @@ def _first_meeting(table, world, constants, state, course, log, i, j, duration, 
         end = min(end_i, end_j)
         path_i = _path_at(log, state, course, constants, i, piece_i, time)
         path_j = _path_at(log, state, course, constants, j, piece_j, time)
-        found = time + pair_meets(table, world, kind_i, body_i, path_i, kind_j, body_j, path_j, end - time, points)
+        found = time + pair_meets(
+            table, world, kind_i, body_i, path_i, kind_j, body_j, path_j, end - time, corners, points
+        )
         time = end
         if end_i <= end and piece_i >= 0:
             piece_i = log.following[piece_i]
@@ -80,8 +83,10 @@ def _stay_apart(table, world, constants, state, course, i, j, normals, slot, dur
     """Whether a normal is soon found that separates particles i and j as long as they go straight on.
 
     First the one in row ``slot`` of ``normals``, which did so a stretch of time ago, or the line of centres. If it
-    does not, the normal of the nearest points is tried, and kept. Nothing but time depends on it.
+    does not, the normal of the nearest points is tried, and kept. Nothing but time depends on it. Returns the corners
+    that hulls are nearest by as well, NO_CORNERS where that was not looked into.
     """
+    corners = NO_CORNERS
     body_i, body_j = body_of(constants, i), body_of(constants, j)
     path_i, path_j = path_of_state(state, course.acceleration, i), path_of_state(state, course.acceleration, j)
     offset = nearest_image(sub(path_j[0], path_i[0]), world.period)
@@ -94,25 +99,26 @@ def _stay_apart(table, world, constants, state, course, i, j, normals, slot, dur
         known = scaled(known, 1.0 / length)
         apart = stays_apart(table, body_i, path_i, body_j, path_j, offset, known, duration)
     if not apart:
-        gap, normal = pair_separation(
-            table, body_i[0], body_i[1], path_i[1], body_j[0], body_j[1], path_j[1], offset, points
+        gap, normal, corners = pair_separation(
+            table, body_i[0], body_i[1], path_i[1], body_j[0], body_j[1], path_j[1], offset, NO_CORNERS, points
         )
         if gap > 0.0:
             put(normals, slot, normal)
             apart = stays_apart(table, body_i, path_i, body_j, path_j, offset, normal, duration)
-    return apart
+    return apart, corners
 
 
 @kernel
-def _look_closer(table, world, constants, state, course, log, pairs, normals, slots, times, duration, first, last):
+def _look_closer(
+    table, world, constants, state, course, log, pairs, normals, slots, times, duration, points, first, last
+):  # fmt: skip
     """Fill in the times of pairs ``first .. last`` where they are -1.
 
     Pairs whose ``slots`` are not -1 go straight on, and have a row in ``normals`` (see neighbours.py).
     """
     table, world, constants, state, course, log = borrowed((table, world, constants, state, course, log))
-    pairs, normals, slots, times = borrowed((pairs, normals, slots, times))
+    pairs, normals, slots, times, points = borrowed((pairs, normals, slots, times, points))
     kind, shape = table.kind, constants.shape
-    points = np.empty((MAX_MANIFOLD, 3))
     for k in range(first, last):
         if times[k] < 0.0:
             i, j = pairs[k, 0], pairs[k, 1]
@@ -121,11 +127,13 @@ def _look_closer(table, world, constants, state, course, log, pairs, normals, sl
                 continue
             times[k] = math.inf
             spheres = kind[shape[i]] == SPHERE and kind[shape[j]] == SPHERE
-            known = not spheres and slots[k] >= 0
-            if not known or not _stay_apart(
-                table, world, constants, state, course, i, j, normals, slots[k], duration, points
-            ):
-                times[k] = _first_meeting(table, world, constants, state, course, log, i, j, duration, points)
+            apart, corners = False, NO_CORNERS
+            if not spheres and slots[k] >= 0:
+                apart, corners = _stay_apart(
+                    table, world, constants, state, course, i, j, normals, slots[k], duration, points
+                )
+            if not apart:
+                times[k] = _first_meeting(table, world, constants, state, course, log, i, j, duration, corners, points)
 
 
 @kernel
@@ -137,13 +145,15 @@ def _across(island, head, first_piece, ball, period, lists, whom, first, last):
     island, head, ball, lists, whom = borrowed((island, head, ball, lists, whom))
     particle, place, start, other = lists
     around = around_of(period)
-    pairs = np.empty((256, 2), dtype=np.int64)
+    most = 0
+    for k in range(first, last):
+        p = place[whom[k]]
+        most += start[p + 1] - start[p]
+    pairs = np.empty((most, 2), dtype=np.int64)
     count = 0
     for k in range(first, last):
         i = whom[k]
         p = place[i]
-        while count + start[p + 1] - start[p] > len(pairs):
-            pairs = grown(pairs)
         for near in range(start[p], start[p + 1]):
             if far_apart(ball, p, other[near], around):
                 continue
@@ -170,7 +180,7 @@ def _follow_paths(
     A parabola between two points on it is farther out than both by at most a t^2 / 8.
     """
     log_piece, following, head, state, acceleration = borrowed((log_piece, following, head, state, acceleration))
-    radius, place, anchor, leash, ball, whom = borrowed((radius, place, anchor, leash, ball, whom))
+    radius, place, anchor, leash, period, ball, whom = borrowed((radius, place, anchor, leash, period, ball, whom))
     on_leash = True
     for k in range(first, last):
         i = whom[k]
@@ -209,7 +219,11 @@ def _met(
     arguments = pairs, normals, slots, times, duration
     crew = Crew(_LOOK * len(pairs))
     # Some pairs take far longer than others: threads that are done take on more.
-    crew.each(lambda _, first, last: _look_closer(*where, *arguments, first, last), len(pairs), 4 * crew.threads)
+    crew.each(
+        lambda _, first, last: _look_closer(*where, *arguments, np.empty((MAX_MANIFOLD, 3)), first, last),
+        len(pairs),
+        4 * crew.threads,
+    )
     meet = times < np.inf
     return pairs[meet], times[meet]
 
@@ -243,7 +257,7 @@ def first_meetings(
         walls = table.kind, constants.shape, *moving, standing, world.lower, world.upper, world.boundary, duration
         parts += crew.each(lambda _, first, last: sieve_walls(*walls, first, last), count)
     pairs, slots, times = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    pairs, times = _met(where, pairs, neighbours.normal, slots[:, 0], times[:, 0], duration)
+    pairs, times = _met(where, pairs, neighbours.normal, slots, times, duration)
     order = np.argsort(pairs[:, 0] * (count + 6) + pairs[:, 1])
     return pairs[order], times[order]
 

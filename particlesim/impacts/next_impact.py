@@ -6,6 +6,7 @@ from particlesim.constants import APPROACH_TOLERANCE, IMPACT_TOLERANCE, SPHERE, 
 from particlesim.impacts.time_of_impact import first_touch, most_closing, sphere_meets_wall, spheres_meet, spheres_near
 from particlesim.jit import kernel
 from particlesim.motion import free_path, spin_of
+from particlesim.narrow_phase.gjk import NO_CORNERS
 from particlesim.narrow_phase.hull_hull import hulls_nearer
 from particlesim.narrow_phase.pair import nearest_image, pair_contact
 from particlesim.narrow_phase.walls import wall_contact, wall_normal
@@ -77,22 +78,22 @@ def _touches(table, world, body_i, path_i, body_j, path_j, wall, points):
 
 
 @kernel
-def _hull_meets(table, world, body_i, path_i, body_j, path_j, wall, start, end, points):
+def _hull_meets(table, world, body_i, path_i, body_j, path_j, wall, start, end, corners, points):
     """When two bodies of which one at least is a hull meet in ``start .. end``, on paths given at time 0."""
-    if wall < 0 and table.kind[body_i[0]] != SPHERE and table.kind[body_j[0]] != SPHERE:
+    if wall < 0 and corners[0] == 0 and table.kind[body_i[0]] != SPHERE and table.kind[body_j[0]] != SPHERE:
         # Most are too far apart, which the first direction or two of the distance algorithm tell.
         offset = nearest_image(sub(path_j[0], path_i[0]), world.period)
         way = most_closing(body_i, path_i, body_j, path_j, end)
         if not hulls_nearer(table, body_i[0], body_i[1], path_i[1], body_j[0], body_j[1], path_j[1], offset, way):
             return math.inf
     where = table, world.lower, world.upper, world.period, body_i, path_i, body_j, path_j, wall, start, end
-    time = first_touch(*where, 0.0, points)
+    time = first_touch(*where, 0.0, corners, points)
     if time == start:
         then_i = later(path_i, body_i[3], start)
         then_j = later(path_j, body_j[3], start)
         touching, approaching, depth = _touches(table, world, body_i, then_i, body_j, then_j, wall, points)
         if touching and not approaching:
-            time = first_touch(*where, depth, points)
+            time = first_touch(*where, depth, corners, points)
     return time
 
 
@@ -118,8 +119,11 @@ def _spheres_meet(body_i, path_i, body_j, path_j, offset, still, duration):
 
 
 @kernel(inline=True)
-def pair_meets(table, world, kind_i, body_i, path_i, kind_j, body_j, path_j, duration, points):
-    """When two particles meet within ``duration`` on paths given at time 0; inf if they do not."""
+def pair_meets(table, world, kind_i, body_i, path_i, kind_j, body_j, path_j, duration, corners, points):
+    """When two particles meet within ``duration`` on paths given at time 0; inf if they do not.
+
+    ``corners`` are those that hulls looked into before were found to be nearest by, or NO_CORNERS (see gjk.py).
+    """
     offset = nearest_image(sub(path_j[0], path_i[0]), world.period)
     acceleration = sub(path_j[4], path_i[4])
     if kind_i == SPHERE and kind_j == SPHERE and dot(acceleration, acceleration) == 0.0:
@@ -129,7 +133,7 @@ def pair_meets(table, world, kind_i, body_i, path_i, kind_j, body_j, path_j, dur
         reach = body_i[2] + body_j[2] + 0.5 * norm(acceleration) * duration * duration
         time, end = spheres_near(offset, sub(path_j[2], path_i[2]), reach, duration)
         if time < math.inf:
-            time = _hull_meets(table, world, body_i, path_i, body_j, path_j, -1, time, end, points)
+            time = _hull_meets(table, world, body_i, path_i, body_j, path_j, -1, time, end, corners, points)
     return time
 
 
@@ -161,5 +165,5 @@ def wall_meets(table, world, lower, upper, boundary, kind, body, path, wall, dur
             time = sphere_meets_wall(room, speed, acceleration, duration)
             if time < math.inf or room <= 0.0:
                 start = time if room > 0.0 else 0.0
-                time = _hull_meets(table, world, body, path, body, path, wall, start, duration, points)
+                time = _hull_meets(table, world, body, path, body, path, wall, start, duration, NO_CORNERS, points)
     return time

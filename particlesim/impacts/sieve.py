@@ -62,8 +62,8 @@ def balls(radius, position, velocity, acceleration, place, duration, ball, first
 def _list(found, slots, times, count, i, j, slot, time):
     found[count, 0] = i
     found[count, 1] = j
-    slots[count, 0] = slot
-    times[count, 0] = time
+    slots[count] = slot
+    times[count] = time
     return count + 1
 
 
@@ -85,19 +85,18 @@ def sieve(
 ):  # fmt: skip
     """Pairs (m, 2), i < j, of places ``first .. last`` with later neighbours that meet, or may, in ``duration`` [s].
 
-    And where they stand in ``later`` (m, 1), and times (m, 1): when they meet, or -1 where the bounding spheres come
+    And where they stand in ``later`` (m,), and times (m,): when they meet, or -1 where the bounding spheres come
     together and more must be known. Where not all are known to accelerate ``alike``, it is looked at for each pair.
     What settles together (see cluster.py) is not looked at.
     """
     kind, shape, acceleration, ball, particle = borrowed((kind, shape, acceleration, ball, particle))
     standing, later_start, later, period = borrowed((standing, later_start, later, period))
     around = around_of(period)
-    found, slots = np.empty((256, 2), dtype=np.int64), np.empty((256, 1), dtype=np.int64)
-    times = np.empty((256, 1))
+    most = later_start[last] - later_start[first]
+    found, slots = np.empty((most, 2), dtype=np.int64), np.empty(most, dtype=np.int64)
+    times = np.empty(most)
     count = 0
     for p in range(first, last):
-        while count + later_start[p + 1] - later_start[p] > len(found):
-            found, slots, times = grown(found), grown(slots), grown(times)
         for near in range(later_start[p], later_start[p + 1]):
             q = later[near]
             if far_apart(ball, p, q, around):
@@ -125,14 +124,13 @@ def sieve_walls(
         (kind, shape, radius, position, velocity, acceleration)
     )
     standing = borrowed(standing)
-    found, slots = np.empty((256, 2), dtype=np.int64), np.empty((256, 1), dtype=np.int64)
-    times = np.empty((256, 1))
+    most = 6 * (last - first)
+    found, slots = np.empty((most, 2), dtype=np.int64), np.empty(most, dtype=np.int64)
+    times = np.empty(most)
     count = 0
     for i in range(first, last):
         if standing[i] == SETTLES:
             continue
-        if count + 6 > len(found):
-            found, slots, times = grown(found), grown(slots), grown(times)
         x, v, a = row(position, i), row(velocity, i), row(acceleration, i)
         way = free_way(v, a, duration)
         for wall in range(6):

@@ -15,17 +15,18 @@ acceleration) at time 0.
 import math
 
 from particlesim.constants import IMPACT_TOLERANCE, SPHERE
+from particlesim.impacts.proven_step import ANY_WAY, STANDING, farthest, longest_proven_step, step_of_turning
 from particlesim.jit import kernel
 from particlesim.motion import free_rotation, spin_of
 from particlesim.narrow_phase.pair import nearest_image, pair_separation
 from particlesim.narrow_phase.walls import wall_normal, wall_separation
-from particlesim.vec import add, along, cross, dot, norm, rotate, rotate_back, row, scaled, sub
+from particlesim.vec import along, dot, norm, rotate_back, scaled, sub
 
 # Looks at the separation in one search, which ends where it is then. Few searches take more than ten.
 _MAX_LOOKS = 60
 
-# Refinements of a proven step, which is shorter than it could be where other corners come to the fore.
-_REFINEMENTS = 3
+# The way that was best in the last look is tried alone as long as each look leaves at most this fraction of the gap.
+_CLOSING_IN = 0.25
 
 
 @kernel(inline=True)
@@ -98,6 +99,13 @@ def _fastest_spin(body, path):
     return min(norm(path[3]) / least, math.sqrt(twice / least))
 
 
+@kernel(inline=True)
+def _turning_speed(kind, body, path):
+    """A bound of the speed of any point of a body by its rotation [m/s], sooner had than the speed itself."""
+    moments = body[3]
+    return body[2] * norm(path[3]) / min(moments[0], moments[1], moments[2]) if kind != SPHERE else 0.0
+
+
 @kernel
 def most_closing(body_i, path_i, body_j, path_j, duration):
     """How far two surfaces can come nearer within ``duration`` at the most [m]."""
@@ -141,127 +149,6 @@ def _bend(kind, body, path):
 
 
 @kernel
-def _farthest(vertex, first, last, direction, change, time):
-    """How far vertices ``first .. last`` reach along ``direction + time * change``, and how fast this grows."""
-    towards = along(direction, change, time)
-    farthest, rate = -math.inf, 0.0
-    for v in range(first, last):
-        corner = row(vertex, v)
-        reach = dot(corner, towards)
-        if reach > farthest:
-            farthest, rate = reach, dot(corner, change)
-    return (farthest, rate) if first < last else (0.0, 0.0)
-
-
-@kernel
-def _proven_step(vertex, range_i, way_i, range_j, way_j, gap, parting, bend, most):
-    """For how long [s], ``most`` at the most, a normal certainly goes on separating two bodies.
-
-    ``gap`` [m] lies between them along the normal, their centroids part at ``parting`` [m/s], corners bend away from
-    their straight ways by ``bend`` [m/s^2] at the most. ``way`` is the normal in body axes, outwards, and how it
-    turns there. What is left of the gap is a concave function of time: between a chord's zero, which is too early,
-    and a tangent's, which is too late.
-    """
-    reach_i, rate_i = _farthest(vertex, range_i[0], range_i[1], way_i[0], way_i[1], 0.0)
-    reach_j, rate_j = _farthest(vertex, range_j[0], range_j[1], way_j[0], way_j[1], 0.0)
-    gap += reach_i + reach_j
-    sure, late = 0.0, most
-    left_sure = gap - reach_i - reach_j
-    for _ in range(_REFINEMENTS):
-        slope = parting - bend * sure - rate_i - rate_j
-        if slope < 0.0:
-            late = min(late, sure - left_sure / slope)
-        reach_i, rate_i = _farthest(vertex, range_i[0], range_i[1], way_i[0], way_i[1], late)
-        reach_j, rate_j = _farthest(vertex, range_j[0], range_j[1], way_j[0], way_j[1], late)
-        left_late = gap + (parting - 0.5 * bend * late) * late - reach_i - reach_j
-        if left_late >= 0.0:
-            return late
-        sure += (late - sure) * left_sure / (left_sure - left_late)
-        reach_i, rate_i = _farthest(vertex, range_i[0], range_i[1], way_i[0], way_i[1], sure)
-        reach_j, rate_j = _farthest(vertex, range_j[0], range_j[1], way_j[0], way_j[1], sure)
-        left_sure = max(0.0, gap + (parting - 0.5 * bend * sure) * sure - reach_i - reach_j)
-    return sure
-
-
-@kernel
-def _facing_edge(vertex, first, last, direction):
-    """From the vertex that reaches farthest along ``direction`` to the one that comes next."""
-    best = second = first
-    reach = nearly = -math.inf
-    for v in range(first, last):
-        r = dot(row(vertex, v), direction)
-        if r > reach:
-            best, second, reach, nearly = v, best, r, reach
-        elif r > nearly:
-            second, nearly = v, r
-    return sub(row(vertex, second), row(vertex, best)) if first < last else (0.0, 0.0, 0.0)
-
-
-@kernel
-def _turning_with_edges(edge_i, with_i, edge_j, with_j, normal):
-    """How a normal turns that stays across an edge of each of two bodies; (0, 0, 0) if the edges are parallel.
-
-    ``with_i`` and ``with_j`` are how it turns with either body.
-    """
-    across_i, across_j = cross(normal, edge_i), cross(edge_j, normal)
-    area = dot(edge_i, across_j)
-    turning = (0.0, 0.0, 0.0)
-    if area != 0.0:
-        turning = along(scaled(across_j, dot(with_i, edge_i) / area), across_i, dot(with_j, edge_j) / area)
-    return turning
-
-
-@kernel
-def _step_of_turning(
-    vertex, range_i, body_i, range_j, body_j, normal, turning, gap, offset, velocity, speed, bend, most
-):
-    """The proven step (see _proven_step) of a normal that turns at ``turning`` [1/s].
-
-    A body is (size, orientation, angular velocity) here; ``offset`` and ``velocity`` are of the second from the
-    first, ``speed`` bounds that of any two of their points. A corner at r moves along the normal n at n . (w x r),
-    which is r . (n x w), and gains r . n' by the normal's own turning.
-    """
-    size_i, turn_i, spin_i = body_i
-    size_j, turn_j, spin_j = body_j
-    back, turning_back = scaled(normal, -1.0), scaled(turning, -1.0)
-    way_i = (
-        scaled(rotate_back(turn_i, normal), size_i),
-        scaled(rotate_back(turn_i, add(turning, cross(normal, spin_i))), size_i),
-    )
-    way_j = (
-        scaled(rotate_back(turn_j, back), size_j),
-        scaled(rotate_back(turn_j, add(turning_back, cross(back, spin_j))), size_j),
-    )
-    rate = norm(turning)
-    # Along a turning normal n, corners a vector s apart bend by n'' . s + 2 n' . s' + n . s''.
-    bend += rate * (rate * speed[1] + 2.0 * speed[0])
-    parting = dot(velocity, normal) + dot(offset, turning)
-    return _proven_step(vertex, range_i, way_i, range_j, way_j, gap, parting, bend, most)
-
-
-@kernel(inline=True)
-def _longest_proven_step(
-    vertex, range_i, body_i, range_j, body_j, normal, stands, gap, offset, velocity, speed, bend, most
-):
-    """The longest of the proven steps of a normal that stands, turns with either body, or with an edge of each.
-
-    Where it ``stands``, as that of a wall, it must not turn.
-    """
-    step = (gap, offset, velocity, speed, bend, most)
-    longest = _step_of_turning(vertex, range_i, body_i, range_j, body_j, normal, (0.0, 0.0, 0.0), *step)
-    if longest >= most or stands:
-        return longest
-    with_i, with_j = cross(body_i[2], normal), cross(body_j[2], normal)
-    edge_i = _facing_edge(vertex, range_i[0], range_i[1], rotate_back(body_i[1], normal))
-    edge_j = _facing_edge(vertex, range_j[0], range_j[1], rotate_back(body_j[1], scaled(normal, -1.0)))
-    with_both = _turning_with_edges(rotate(body_i[1], edge_i), with_i, rotate(body_j[1], edge_j), with_j, normal)
-    for turning in (with_i, with_j, with_both):
-        if longest < most:
-            longest = max(longest, _step_of_turning(vertex, range_i, body_i, range_j, body_j, normal, turning, *step))
-    return longest
-
-
-@kernel
 def stays_apart(table, body_i, path_i, body_j, path_j, offset, normal, duration):
     """Whether a normal that stands is proven to separate two bodies, now at ``offset``, for ``duration`` [s]."""
     vertex, vertex_start = table.vertex, table.vertex_start
@@ -272,30 +159,36 @@ def stays_apart(table, body_i, path_i, body_j, path_j, offset, normal, duration)
     reach_i, reach_j = body_i[2], body_j[2]
     if kind_i != SPHERE:
         way = scaled(rotate_back(path_i[1], normal), body_i[1])
-        reach_i, _ = _farthest(vertex, range_i[0], range_i[1], way, nothing, 0.0)
+        reach_i, _ = farthest(vertex, range_i[0], range_i[1], way, nothing, 0.0)
     if kind_j != SPHERE:
         way = scaled(rotate_back(path_j[1], normal), -body_j[1])
-        reach_j, _ = _farthest(vertex, range_j[0], range_j[1], way, nothing, 0.0)
+        reach_j, _ = farthest(vertex, range_j[0], range_j[1], way, nothing, 0.0)
     # What nearly touches is left to the search, which knows whether that is an impact.
     gap = dot(offset, normal) - reach_i - reach_j - 2.0 * IMPACT_TOLERANCE * (body_i[1] + body_j[1])
     if gap <= 0.0:
         return False
+    # Most are so far apart that not even their fastest corners close the gap.
+    turning = _turning_speed(kind_i, body_i, path_i) + _turning_speed(kind_j, body_j, path_j)
+    pull = norm(sub(path_j[4], path_i[4])) * duration
+    if gap >= (max(0.0, dot(sub(path_i[2], path_j[2]), normal)) + 0.5 * pull + turning) * duration:
+        return True
     bend = norm(sub(path_j[4], path_i[4])) + _bend(kind_i, body_i, path_i) + _bend(kind_j, body_j, path_j)
     now_i = body_i[1], path_i[1], spin_of(path_i[1], path_i[3], body_i[3])
     now_j = body_j[1], path_j[1], spin_of(path_j[1], path_j[3], body_j[3])
     velocity, speed = sub(path_j[2], path_i[2]), (0.0, 0.0)
-    step = _step_of_turning(
+    step = step_of_turning(
         vertex, range_i, now_i, range_j, now_j, normal, nothing, gap, offset, velocity, speed, bend, duration
     )
     return step >= duration
 
 
 @kernel
-def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wall, start, end, sunk, points):
+def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wall, start, end, sunk, corners, points):
     """When the separation of two bodies first falls to nothing in ``start .. end`` [s]; inf if it does not.
 
     The partner is wall ``wall``, or body j if that is -1. With ``sunk`` [m] it is when the separation falls to minus
-    that. At the moment returned it is larger, by IMPACT_TOLERANCE of their sizes at the most.
+    that. At the moment returned it is larger, by IMPACT_TOLERANCE of their sizes at the most. ``corners`` are those by
+    which hulls are likely to be nearest, or NO_CORNERS.
     """
     vertex, vertex_start = table.vertex, table.vertex_start
     kind_i, kind_j = table.kind[body_i[0]], table.kind[body_j[0]]
@@ -310,7 +203,7 @@ def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wal
     else:
         turning += _fastest_corner(body_j, path_j)
     way = norm(velocity) + norm(acceleration) * end
-    time = start
+    time, last_gap, best, bend = start, math.inf, ANY_WAY, -1.0
     for _ in range(_MAX_LOOKS):
         x, q, w = _place(kind_i, body_i, path_i, time)
         p, u = q, (0.0, 0.0, 0.0)
@@ -321,7 +214,9 @@ def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wal
         else:
             y, p, u = _place(kind_j, body_j, path_j, time)
             offset = nearest_image(sub(y, x), period)
-            gap, normal = pair_separation(table, body_i[0], body_i[1], q, body_j[0], body_j[1], p, offset, points)
+            gap, normal, corners = pair_separation(
+                table, body_i[0], body_i[1], q, body_j[0], body_j[1], p, offset, corners, points
+            )
         gap += sunk
         if gap <= IMPACT_TOLERANCE * sizes:
             return time
@@ -331,17 +226,18 @@ def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wal
         closing = turning + max(0.0, -dot(now, normal)) + norm(acceleration) * left
         if gap - IMPACT_TOLERANCE * sizes > closing * left:
             return math.inf
-        bend = norm(acceleration) + _bend(kind_i, body_i, path_i)
-        if wall < 0:
-            bend += _bend(kind_j, body_j, path_j)
-        step = _longest_proven_step(
+        if bend < 0.0:
+            bend = norm(acceleration) + _bend(kind_i, body_i, path_i)
+            bend += _bend(kind_j, body_j, path_j) if wall < 0 else 0.0
+        way_of_normal = best if gap <= _CLOSING_IN * last_gap else ANY_WAY
+        step, best = longest_proven_step(
             vertex,
             range_i,
             (body_i[1], q, w),
             range_j,
             (body_j[1], p, u),
             normal,
-            wall >= 0,
+            STANDING if wall >= 0 else way_of_normal,
             gap,
             offset,
             now,
@@ -351,5 +247,5 @@ def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wal
         )
         if step >= left:
             return math.inf
-        time += step
+        time, last_gap = time + step, gap
     return time

@@ -26,6 +26,9 @@ _ROUNDING = 1e-14
 
 _ORIGIN = (0.0, 0.0, 0.0)
 
+# Corners of no simplex: how many, and the vertices of either hull that they are differences of.
+NO_CORNERS = (0, (-1, -1, -1, -1), (-1, -1, -1, -1))
+
 
 @kernel
 def _support(vertices, matrix, direction):
@@ -145,16 +148,20 @@ def _weighted(vertices, size, matrix, picks, weights, count):
 @kernel
 def hulls_apart(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching):
     """Whether hull b, centred at ``offset`` from hull a, is farther from it than ``touching`` [m]."""
-    length, _, _, _ = hull_distance(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching, True)
+    length, _, _, _, _ = hull_distance(
+        vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching, True, NO_CORNERS
+    )
     return length > touching
 
 
 @kernel
-def hull_distance(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching, only_whether):
+def hull_distance(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching, only_whether, known):
     """Distance of hull b, centred at ``offset`` from hull a, and the nearest points relative to a's centroid.
 
-    Returns (distance, direction from a to b, point of a, point of b). The direction, of any length, is the one along
-    which they are proven to be that far apart: near contact it is more certain than the difference of the points.
+    Returns (distance, direction from a to b, point of a, point of b, corners). The direction, of any length, is the one
+    along which they are proven to be that far apart: near contact it is more certain than the difference of the points.
+    The corners are those of the last simplex. ``known`` are corners to begin with: those of the last simplex when the
+    hulls were a little elsewhere save most of the search.
     The distance is 0 if they overlap, are nearer than ``touching`` [m], or if rounding ended the search farther than
     that from a proof of the distance. With ``only_whether`` any number above ``touching`` may stand for the distance
     of hulls that are apart: the first separating direction ends the search.
@@ -166,23 +173,27 @@ def hull_distance(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, of
     apart = v
     length, at_least = math.inf, -math.inf
     count = idle = 0
-    for _ in range(_MAX_STEPS):
-        a = _support(vertices_a, matrix_a, v)
-        b = _support(vertices_b, matrix_b, scaled(v, -1.0))
+    for step in range(_MAX_STEPS):
+        searched = step >= known[0]
+        a = _support(vertices_a, matrix_a, v) if searched else known[1][step]
+        b = _support(vertices_b, matrix_b, scaled(v, -1.0)) if searched else known[2][step]
         w = sub(add(offset, _vertex(vertices_b, size_b, matrix_b, b)), _vertex(vertices_a, size_a, matrix_a, a))
-        bound = dot(v, w) / norm(v)
-        if bound > at_least:
-            at_least, apart = bound, v
-        if only_whether and at_least > touching:
-            return at_least, v, _ORIGIN, _ORIGIN
-        if count > 0 and length - at_least <= _GAP * length:
-            break
-        if _holds(picks_a, picks_b, count, a, b):
-            break
+        if searched:
+            bound = dot(v, w) / norm(v)
+            if bound > at_least:
+                at_least, apart = bound, v
+            if only_whether and at_least > touching:
+                return at_least, v, _ORIGIN, _ORIGIN, NO_CORNERS
+            if count > 0 and length - at_least <= _GAP * length:
+                break
+            if _holds(picks_a, picks_b, count, a, b):
+                break
         simplex = _replaced(simplex, count, w)
         picks_a, picks_b = _replaced(picks_a, count, a), _replaced(picks_b, count, b)
         shorter2, nearest, found, part, of_part = _nearest_of_simplex(simplex, count)
         shorter = math.sqrt(shorter2)
+        if not searched and shorter >= length:
+            continue
         idle += shorter >= length
         if shorter > length + touching + _ROUNDING * length or idle > _MAX_IDLE:
             break
@@ -194,4 +205,4 @@ def hull_distance(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, of
         length = 0.0
     point_a = _weighted(vertices_a, size_a, matrix_a, picks_a, weights, count)
     point_b = add(offset, _weighted(vertices_b, size_b, matrix_b, picks_b, weights, count))
-    return length, apart, point_a, point_b
+    return length, apart, point_a, point_b, (count, picks_a, picks_b)

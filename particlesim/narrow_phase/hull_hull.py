@@ -4,7 +4,7 @@ import numpy as np
 
 from particlesim.constants import MAX_MANIFOLD, PARALLEL_TOLERANCE
 from particlesim.jit import kernel
-from particlesim.narrow_phase.gjk import hull_distance, hulls_apart
+from particlesim.narrow_phase.gjk import NO_CORNERS, hull_distance, hulls_apart
 from particlesim.narrow_phase.manifold import hull_patch
 from particlesim.narrow_phase.separating_axis import hull_depth
 from particlesim.vec import add, matrix_of, norm, scaled
@@ -39,10 +39,13 @@ def hulls_nearer(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset
 
 
 @kernel(inline=True)
-def hull_separation(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset):
-    """Separation, normal from a to b and half way between the nearest points, of hull b at ``offset`` from hull a."""
+def hull_separation(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset, known):
+    """Separation, normal from a to b and half way between the nearest points, of hull b at ``offset`` from hull a.
+
+    And the corners that these were found from; ``known`` are corners to begin with (see hull_distance).
+    """
     joined = _JOINED * (table.radius[shape_a] * size_a + table.radius[shape_b] * size_b)
-    separation, apart, point_a, point_b = hull_distance(
+    separation, apart, point_a, point_b, corners = hull_distance(
         _vertices(table, shape_a),
         size_a,
         matrix_a,
@@ -52,12 +55,13 @@ def hull_separation(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b,
         offset,
         joined,
         False,
+        known,
     )
     if separation > 0.0:
         normal = scaled(apart, 1.0 / norm(apart))
     else:
         separation, normal = hull_depth(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset)
-    return separation, normal, scaled(add(point_a, point_b), 0.5)
+    return separation, normal, scaled(add(point_a, point_b), 0.5), corners
 
 
 @kernel(inline=True)
@@ -65,7 +69,9 @@ def hull_hull(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, p
     """Separation, normal from a to b and number of contact points of hull b at ``offset`` from hull a."""
     gaps = np.empty(MAX_MANIFOLD)
     matrix_a, matrix_b = matrix_of(turn_a), matrix_of(turn_b)
-    separation, normal, middle = hull_separation(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset)
+    separation, normal, middle, _ = hull_separation(
+        table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset, NO_CORNERS
+    )
     count = hull_patch(
         table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b,
         offset, normal, separation, middle, PARALLEL_TOLERANCE, 0.0, points, gaps,

@@ -49,15 +49,19 @@ def pair_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset
 
 
 @kernel(inline=True)
-def pair_separation(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
-    """Separation and normal as of pair_contact, without the corners of the patch; ``points`` is scratch."""
+def pair_separation(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, known, points):
+    """Separation and normal as of pair_contact, without the corners of the patch; ``points`` is scratch.
+
+    And the corners from which hulls find them sooner when they have moved a little: ``known``, or NO_CORNERS.
+    """
+    corners = known
     if table.kind[shape_a] == SPHERE or table.kind[shape_b] == SPHERE:
         separation, normal, _ = _sphere_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points)
     else:
-        separation, normal, _ = hull_separation(
-            table, shape_a, size_a, matrix_of(turn_a), shape_b, size_b, matrix_of(turn_b), offset
+        separation, normal, _, corners = hull_separation(
+            table, shape_a, size_a, matrix_of(turn_a), shape_b, size_b, matrix_of(turn_b), offset, known
         )
-    return separation, normal
+    return separation, normal, corners
 
 
 @kernel(inline=True)
