@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.constants import FREE, HULL, LOOSE, MAX_MANIFOLD, RESTING_DROP, RESTING_TILT, SETTLES, STILL, WALL
+from particlesim.impacts.bending import bend
 from particlesim.impacts.response import restitution_of
 from particlesim.impacts.sieve import grown
 from particlesim.jit import borrowed, kernel
@@ -21,8 +22,6 @@ from particlesim.narrow_phase.manifold import hull_patch
 from particlesim.narrow_phase.pair import nearest_image, pair_contact
 from particlesim.narrow_phase.walls import wall_normal
 from particlesim.vec import (
-    add,
-    along,
     apply,
     conjugate,
     cross,
@@ -41,10 +40,11 @@ from particlesim.vec import (
 
 # Columns of a contact point: normal, what a unit impulse does to the two angular momenta and the two spins, effective
 # mass, gap [m], how fast the partners part [m/s], their restitution, the speed below which they come to rest, the
-# smaller inscribed radius, how far apart the centroids are along the normal, and how far turning may close the gap [m].
+# smaller inscribed radius, how far apart the centroids are along the normal, how far turning may close the gap [m], and
+# where the point is from the first centroid.
 NORMAL, LEVER_I, LEVER_J, TWIST_I, TWIST_J = 0, 3, 6, 9, 12
-MASS, GAP, PARTING, RESTITUTION, SLOW, INRADIUS, APART, BEND = 15, 16, 17, 18, 19, 20, 21, 22
-COLUMNS = 23
+MASS, GAP, PARTING, RESTITUTION, SLOW, INRADIUS, APART, BEND, ARM = 15, 16, 17, 18, 19, 20, 21, 22, 23
+COLUMNS = 26
 
 # Contact points are as far ahead as bodies come that are this much faster than they are thought to be.
 FASTER = 2.0
@@ -55,6 +55,10 @@ _HANDED_ON = 0.3
 
 # Inclined by more than this [sine of the angle], features are no patch, however fast they turn.
 _MOST_TILT = 0.2
+
+# Bodies that sink in farther than this fraction of the inscribed radius, as they turn by what they have been given, are
+# given it anew.
+SUNK = 1e-4
 
 # Faces and edges reach this fraction of the inscribed radius over their ends at the most, for what may slide there.
 _BORDER = 0.02
@@ -107,6 +111,20 @@ def _wall_points(table, world, constants, state, i, wall, reach, points, gaps):
 
 
 @kernel
+def _with_nearest(points, gaps, count, nearest, gap, tolerance):
+    """Add the ``nearest`` point of two hulls, and its ``gap``, to a patch that has none as near; returns how many."""
+    least = gaps[0]
+    for k in range(1, count):
+        least = min(least, gaps[k])
+    if least <= gap + tolerance:
+        return count
+    slot = min(count, MAX_MANIFOLD - 1)
+    put(points, slot, nearest)
+    gaps[slot] = gap
+    return slot + 1
+
+
+@kernel
 def _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps):
     """Contact points of two particles within ``reach``, and the gaps there: (normal, offset, how many, least gap)."""
     offset = nearest_image(sub(row(state.position, j), row(state.position, i)), world.period)
@@ -127,6 +145,7 @@ def _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps
                 table, shape_i, size_i, matrix_i, shape_j, size_j, matrix_j,
                 offset, normal, gap, middle, tilt, min(reach, border), points, gaps,
             )  # fmt: skip
+            count = _with_nearest(points, gaps, count, middle, gap, RESTING_DROP * border)
     else:
         gap, normal, count = pair_contact(table, shape_i, size_i, turn_i, shape_j, size_j, turn_j, offset, points)
         gaps[0] = gap
@@ -134,22 +153,11 @@ def _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps
 
 
 @kernel
-def _bend(kind, spin, arm, normal, across):
-    """The most that the gap at a point of a body shrinks by its turning, and by what slides across it [m/s^2].
-
-    The plane of a turning face accelerates towards a point ahead of it by w^2 times its distance from the centroid, and
-    by 2 w times the speed ``across`` at which the point slides along it.
-    """
-    turning = norm(spin) if kind == HULL else 0.0
-    return turning * (turning * abs(dot(arm, normal)) + 2.0 * across)
-
-
-@kernel
 def _write(table, constants, state, spin, i, j, normal, offset, arm, duration, m, partner, point):
     """Write contact point ``m``, but for its gap and what its partners are made of; returns how fast they part."""
-    against = add(row(state.velocity, i), cross(row(spin, i), arm))
     partner[m, 0], partner[m, 1] = i, j
     _put_column(point, m, NORMAL, normal)
+    _put_column(point, m, ARM, arm)
     lever = cross(arm, normal)
     twist = spin_of(row4(state.orientation, i), lever, row(constants.inertia, i))
     _put_column(point, m, LEVER_I, lever)
@@ -165,13 +173,7 @@ def _write(table, constants, state, spin, i, j, normal, offset, arm, duration, m
         _put_column(point, m, TWIST_J, twist)
         inverse_mass += 1.0 / constants.mass[j] + dot(lever, twist)
         parting += dot(normal, row(state.velocity, j)) + dot(lever, row(spin, j))
-        against = sub(against, add(row(state.velocity, j), cross(row(spin, j), sub(arm, offset))))
-    across = norm(along(against, normal, parting))
-    bend = 0.0
-    if j >= 0:
-        bend = _bend(table.kind[constants.shape[i]], row(spin, i), arm, normal, across)
-        bend += _bend(table.kind[constants.shape[j]], row(spin, j), sub(arm, offset), normal, across)
-    point[m, BEND] = 0.5 * bend * duration * duration
+    point[m, BEND] = bend(table, constants, state, spin, i, j, normal, offset, arm, duration)
     point[m, MASS], point[m, PARTING], point[m, APART] = 1.0 / inverse_mass, parting, dot(offset, normal)
     return parting
 
@@ -188,15 +190,14 @@ def _add_contact(table, world, constants, state, spin, pace, duration, i, j, cle
     restitution, slow = restitution_of(world, constants, i, j)
     inradius = constants.inradius[i]
     speed = pace[i]
-    tilt = norm(row(spin, i))
     if j >= 0:
         inradius = min(inradius, constants.inradius[j])
         speed += pace[j]
-        tilt += norm(row(spin, j))
     lossless = restitution == 1.0
-    # A corner that turns this fast comes down on a face within the stretch.
-    tilt = RESTING_TILT if lossless else min(max(RESTING_TILT, FASTER * tilt * duration), _MOST_TILT)
-    reach = RESTING_DROP * inradius + FASTER * speed * duration
+    way = FASTER * speed * duration
+    # A corner that is turned by so much comes down on a face within the stretch.
+    tilt = RESTING_TILT if lossless else min(max(RESTING_TILT, way / inradius), _MOST_TILT)
+    reach = RESTING_DROP * inradius + way
     if lossless:
         slow, reach = STILL * slow, STILL * RESTING_DROP * inradius
     what = LOOSE if lossless else SETTLES
@@ -214,6 +215,30 @@ def _add_contact(table, world, constants, state, spin, pace, duration, i, j, cle
             return size, LOOSE, clear
         point[m, GAP], point[m, RESTITUTION], point[m, SLOW], point[m, INRADIUS] = gaps[k], restitution, slow, inradius
     return size + count, what if lossless or count > 0 else FREE, clear
+
+
+@kernel
+def bend_more(table, world, constants, state, spin, partner, point, duration):
+    """Let gaps close by as much as turning closes them at the velocities and spins of now, where that matters.
+
+    That is where bodies that go on like this for ``duration`` [s] sink in. Returns whether it is anywhere.
+    """
+    table, world, constants, state = borrowed((table, world, constants, state))
+    anywhere = False
+    for k in range(len(point)):
+        i, j = partner[k, 0], partner[k, 1]
+        normal = column(point, k, NORMAL)
+        offset = (0.0, 0.0, 0.0)
+        parting = -dot(normal, row(state.velocity, i)) - dot(column(point, k, LEVER_I), row(spin, i))
+        if j >= 0:
+            offset = nearest_image(sub(row(state.position, j), row(state.position, i)), world.period)
+            parting += dot(normal, row(state.velocity, j)) + dot(column(point, k, LEVER_J), row(spin, j))
+        way = bend(table, constants, state, spin, i, j, normal, offset, column(point, k, ARM), duration)
+        sunk = point[k, GAP] + parting * duration - way < -SUNK * point[k, INRADIUS]
+        if sunk and way > point[k, BEND]:
+            point[k, BEND] = way
+            anywhere = True
+    return anywhere
 
 
 @kernel

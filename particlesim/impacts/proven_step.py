@@ -82,7 +82,7 @@ def _facing_edge(vertex, first, last, direction):
 
 
 @kernel
-def _turning_with_edges(edge_i, with_i, edge_j, with_j, normal):
+def turning_with_edges(edge_i, with_i, edge_j, with_j, normal):
     """How a normal turns that stays across an edge of each of two bodies; (0, 0, 0) if the edges are parallel.
 
     ``with_i`` and ``with_j`` are how it turns with either body.
@@ -133,7 +133,7 @@ def _turning_of(way, vertex, range_i, body_i, range_j, body_j, normal):
         return with_i if way == _WITH_FIRST else with_j
     edge_i = _facing_edge(vertex, range_i[0], range_i[1], rotate_back(body_i[1], normal))
     edge_j = _facing_edge(vertex, range_j[0], range_j[1], rotate_back(body_j[1], scaled(normal, -1.0)))
-    return _turning_with_edges(rotate(body_i[1], edge_i), with_i, rotate(body_j[1], edge_j), with_j, normal)
+    return turning_with_edges(rotate(body_i[1], edge_i), with_i, rotate(body_j[1], edge_j), with_j, normal)
 
 
 @kernel

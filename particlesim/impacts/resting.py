@@ -14,6 +14,7 @@ from particlesim.impacts.cluster import (
     APART,
     FASTER,
     LEVER_I,
+    bend_more,
     expected_paces,
     find_cluster,
     handed_down,
@@ -32,6 +33,9 @@ _SHORTEST_STRETCH = 0.25
 
 # What lies still is thought to become this much faster by others than by gravity in a stretch.
 _HASTE = 4.0
+
+# How often velocities are sought anew because bodies turn otherwise by what they are given, and gaps close otherwise.
+_MOST_BENDINGS = 4
 
 # Looks at who may meet whom in a stretch, until no body becomes faster than was thought.
 _MAX_LOOKS = 5
@@ -100,25 +104,50 @@ class Resting:
                 return
             contact = partner[:, 0] * (len(pace) + 6) + partner[:, 1] + 6
             impulse = self._forces_of(contact, point) * duration
-            pressed, done, steady = settle(
-                self._world, constants, state, spin, partner, point, duration, impulse, acceleration
-            )
-            self._held = np.flatnonzero(pressed)
-            self._before = before[0][self._held], before[1][self._held]
+            impulse, steady, turning, done = self._settle(partner, point, spin, duration, before, impulse, acceleration)
             self._contact, self._force = contact, steady / duration
             self._lever = point[:, LEVER_I : LEVER_I + 3].copy()
-            reached = surface_paces(constants, state, spins(constants, state))
+            reached = surface_paces(constants, state, turning)
             self._fastest = float(reached[self._held].max(initial=0.0))
             foreseen = bool((reached <= FASTER * pace).all())
             self.unresolved = not (done and foreseen)
             if foreseen or look == _MAX_LOOKS:
                 break
             np.maximum(pace, FASTER * reached, out=pace)
-            self.release()
-            acceleration[self._held] = self._world.gravity
+            self._undo(acceleration)
         on_wall = partner[:, 1] < 0
         self.wall_impulse = np.bincount(-1 - partner[on_wall, 1], impulse[on_wall], minlength=6)
         self.virial = float((impulse * point[:, APART])[~on_wall].sum())
+
+    def _settle(
+        self,
+        partner: np.ndarray,
+        point: np.ndarray,
+        spin: np.ndarray,
+        duration: float,
+        before: tuple[np.ndarray, np.ndarray],
+        impulse: np.ndarray,
+        acceleration: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+        """Let bodies settle, and anew where they then turn so that gaps close otherwise than was thought.
+
+        Returns the impulses, those without what makes points part again, the angular velocities, and whether the
+        impulses are good enough.
+        """
+        where = self._table, self._world, self._constants, self._state
+        for bending in range(_MOST_BENDINGS):
+            pressed, done, steady = settle(*where[1:], spin, partner, point, duration, impulse, acceleration)
+            self._held = np.flatnonzero(pressed)
+            self._before = before[0][self._held], before[1][self._held]
+            turning = spins(self._constants, self._state)
+            if not bend_more(*where, turning, partner, point, duration):
+                break
+            if bending + 1 == _MOST_BENDINGS:
+                done = False
+                break
+            self._undo(acceleration)
+            impulse = steady
+        return impulse, steady, turning, done
 
     def _keep_clearance(self, neighbours: Neighbours) -> None:
         """Bring up to date how far surfaces have come; of new neighbours nothing is known yet."""
@@ -126,6 +155,10 @@ class Resting:
         if neighbours is not self._neighbours:
             self._neighbours = neighbours
             self._clearance = np.full(len(neighbours.lists.other), -np.inf)
+
+    def _undo(self, acceleration: np.ndarray) -> None:
+        self.release()
+        acceleration[self._held] = self._world.gravity
 
     def release(self) -> None:
         """Undo what the last ``hold`` did to the state."""
