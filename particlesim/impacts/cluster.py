@@ -57,8 +57,9 @@ _HANDED_ON = 0.3
 _MOST_TILT = 0.2
 
 # Bodies that sink in farther than this fraction of the inscribed radius, as they turn by what they have been given, are
-# given it anew.
-SUNK = 1e-4
+# given it anew, if what turning closes has grown by this factor.
+_SUNK = 1e-4
+_GROWN = 1.1
 
 # Faces and edges reach this fraction of the inscribed radius over their ends at the most, for what may slide there.
 _BORDER = 0.02
@@ -234,8 +235,8 @@ def bend_more(table, world, constants, state, spin, partner, point, duration):
             offset = nearest_image(sub(row(state.position, j), row(state.position, i)), world.period)
             parting += dot(normal, row(state.velocity, j)) + dot(column(point, k, LEVER_J), row(spin, j))
         way = bend(table, constants, state, spin, i, j, normal, offset, column(point, k, ARM), duration)
-        sunk = point[k, GAP] + parting * duration - way < -SUNK * point[k, INRADIUS]
-        if sunk and way > point[k, BEND]:
+        sunk = point[k, GAP] + parting * duration - way < -_SUNK * point[k, INRADIUS]
+        if sunk and way > _GROWN * point[k, BEND]:
             point[k, BEND] = way
             anywhere = True
     return anywhere
