@@ -154,6 +154,16 @@ def _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps
 
 
 @kernel
+def _parting(state, spin, i, j, point, k):
+    """How fast particle ``i`` and partner ``j`` part at contact point ``k`` at the velocities and spins given [m/s]."""
+    normal = column(point, k, NORMAL)
+    parting = -dot(normal, row(state.velocity, i)) - dot(column(point, k, LEVER_I), row(spin, i))
+    if j >= 0:
+        parting += dot(normal, row(state.velocity, j)) + dot(column(point, k, LEVER_J), row(spin, j))
+    return parting
+
+
+@kernel
 def _write(table, constants, state, spin, i, j, normal, offset, arm, duration, m, partner, point):
     """Write contact point ``m``, but for its gap and what its partners are made of; returns how fast they part."""
     partner[m, 0], partner[m, 1] = i, j
@@ -166,14 +176,13 @@ def _write(table, constants, state, spin, i, j, normal, offset, arm, duration, m
     _put_column(point, m, LEVER_J, (0.0, 0.0, 0.0))
     _put_column(point, m, TWIST_J, (0.0, 0.0, 0.0))
     inverse_mass = 1.0 / constants.mass[i] + dot(lever, twist)
-    parting = -dot(normal, row(state.velocity, i)) - dot(lever, row(spin, i))
     if j >= 0:
         lever = cross(sub(arm, offset), normal)
         twist = spin_of(row4(state.orientation, j), lever, row(constants.inertia, j))
         _put_column(point, m, LEVER_J, lever)
         _put_column(point, m, TWIST_J, twist)
         inverse_mass += 1.0 / constants.mass[j] + dot(lever, twist)
-        parting += dot(normal, row(state.velocity, j)) + dot(lever, row(spin, j))
+    parting = _parting(state, spin, i, j, point, m)
     point[m, BEND] = bend(table, constants, state, spin, i, j, normal, offset, arm, duration)
     point[m, MASS], point[m, PARTING], point[m, APART] = 1.0 / inverse_mass, parting, dot(offset, normal)
     return parting
@@ -230,12 +239,10 @@ def bend_more(table, world, constants, state, spin, partner, point, duration):
         i, j = partner[k, 0], partner[k, 1]
         normal = column(point, k, NORMAL)
         offset = (0.0, 0.0, 0.0)
-        parting = -dot(normal, row(state.velocity, i)) - dot(column(point, k, LEVER_I), row(spin, i))
         if j >= 0:
             offset = nearest_image(sub(row(state.position, j), row(state.position, i)), world.period)
-            parting += dot(normal, row(state.velocity, j)) + dot(column(point, k, LEVER_J), row(spin, j))
         way = bend(table, constants, state, spin, i, j, normal, offset, column(point, k, ARM), duration)
-        sunk = point[k, GAP] + parting * duration - way < -_SUNK * point[k, INRADIUS]
+        sunk = point[k, GAP] + _parting(state, spin, i, j, point, k) * duration - way < -_SUNK * point[k, INRADIUS]
         if sunk and way > _GROWN * point[k, BEND]:
             point[k, BEND] = way
             anywhere = True
