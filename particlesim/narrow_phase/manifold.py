@@ -32,10 +32,10 @@ def _flattest_edge(edge, first, last, vertices, corner, direction, tilt):
 
 @kernel
 def facing_feature(table, shape, size, matrix, offset, direction, tilt, feature):
-    """Write the face, edge or vertex of a hull that faces ``direction``; returns (corners, whether it is a face).
+    """Write the face, edge or vertex of a hull that faces ``direction``.
 
     Faces and edges may be inclined by ``tilt`` [sine of the angle]. ``feature`` is (MAX_CORNERS, 3); ``offset`` is
-    the hull's centroid.
+    the hull's centroid. Returns how many corners there are, and how much a face is inclined; inf if it is none.
     """
     local = apply_transposed(matrix, direction)
     # Taken out of their struct once: each access counts references, which costs more than the arithmetic.
@@ -52,7 +52,7 @@ def facing_feature(table, shape, size, matrix, offset, direction, tilt, feature)
         first, last = loop_start[face], loop_start[face + 1]
         for k in range(first, last):
             put(feature, k - first, add(offset, apply(matrix, scaled(row(vertices, loop[k]), size))))
-        return last - first, True
+        return last - first, least
     best, reach = 0, -math.inf
     for v in range(len(vertices)):
         r = dot(row(vertices, v), local)
@@ -63,9 +63,9 @@ def facing_feature(table, shape, size, matrix, offset, direction, tilt, feature)
         table.edge, table.edge_start[shape], table.edge_start[shape + 1], vertices, best, local, tilt
     )
     if other < 0:
-        return 1, False
+        return 1, math.inf
     put(feature, 1, add(offset, apply(matrix, scaled(row(vertices, other), size))))
-    return 2, False
+    return 2, math.inf
 
 
 @kernel
@@ -157,8 +157,11 @@ def hull_patch(
     of_a, of_b = np.empty((MAX_CORNERS, 3)), np.empty((MAX_CORNERS, 3))
     spare = np.empty((MAX_CORNERS, 3))
     back = scaled(normal, -1.0)
-    count_a, face_a = facing_feature(table, shape_a, size_a, matrix_a, (0.0, 0.0, 0.0), normal, tilt, of_a)
-    count_b, face_b = facing_feature(table, shape_b, size_b, matrix_b, offset, back, tilt, of_b)
+    count_a, slope_a = facing_feature(table, shape_a, size_a, matrix_a, (0.0, 0.0, 0.0), normal, tilt, of_a)
+    count_b, slope_b = facing_feature(table, shape_b, size_b, matrix_b, offset, back, tilt, of_b)
+    # Of two faces that are inclined the corners of one are looked at over the one that the normal belongs to.
+    face_b = slope_b < slope_a - PARALLEL_TOLERANCE
+    face_a = slope_a < math.inf and not face_b
     patch, shift = of_a, 0.5 * separation
     if count_a == 1:
         count = 1
