@@ -6,6 +6,8 @@ Tuples live in registers: no kernel allocates an array for a vector.
 
 import math
 
+import numpy as np
+
 from particlesim.jit import kernel
 
 
@@ -42,6 +44,16 @@ def put4(array, index, q):
     array[index, 1] = q[1]
     array[index, 2] = q[2]
     array[index, 3] = q[3]
+
+
+@kernel
+def grown(array):
+    """An array with the rows of this one and room for as many again."""
+    longer = np.empty((2 * array.shape[0], array.shape[1]), dtype=array.dtype)
+    for k in range(array.shape[0]):
+        for column in range(array.shape[1]):
+            longer[k, column] = array[k, column]
+    return longer
 
 
 @kernel

@@ -6,10 +6,8 @@ turns, what slides across its surface bends as well: the normal turns with a fac
 turns the faster the more nearly parallel they are.
 """
 
-import math
-
 from particlesim.constants import HULL
-from particlesim.impacts.proven_step import turning_with_edges
+from particlesim.impacts.proven_step import facing_edge, turning_with_edges
 from particlesim.jit import kernel
 from particlesim.vec import add, along, cross, dot, norm, rotate, rotate_back, row, row4, scaled, sub
 
@@ -22,20 +20,9 @@ _LEVEL = 1e-6
 @kernel
 def _edge_facing(table, shape, turn, direction):
     """The edge of a hull that faces ``direction``, in world axes; (0, 0, 0) if a corner or a face does."""
-    local = rotate_back(turn, direction)
-    best = second = -1
-    reach = nearly = next_reach = -math.inf
-    for v in range(table.vertex_start[shape], table.vertex_start[shape + 1]):
-        r = dot(row(table.vertex, v), local)
-        if r > reach:
-            best, second, reach, nearly, next_reach = v, best, r, reach, nearly
-        elif r > nearly:
-            second, nearly, next_reach = v, r, nearly
-        else:
-            next_reach = max(next_reach, r)
-    if nearly < reach - _LEVEL or next_reach >= reach - _LEVEL:
-        return _STILL
-    return rotate(turn, sub(row(table.vertex, second), row(table.vertex, best)))
+    first, last = table.vertex_start[shape], table.vertex_start[shape + 1]
+    edge, second, third = facing_edge(table.vertex, first, last, rotate_back(turn, direction))
+    return rotate(turn, edge) if second <= _LEVEL < third else _STILL
 
 
 @kernel

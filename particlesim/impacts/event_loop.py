@@ -11,12 +11,11 @@ from particlesim.constants import MAX_IMPACTS, MAX_SLOW_IMPACTS, SIMULTANEOUS
 from particlesim.impacts.course import NOTHING_MET, PIECE, UNCHAINED, path_of_state, write_piece
 from particlesim.impacts.next_impact import body_of, later, pair_meets, wall_meets
 from particlesim.impacts.response import NOTHING, STRUCK, answer, let_go
-from particlesim.impacts.sieve import grown
 from particlesim.impacts.two_spheres import answer_two, meet_alone
 from particlesim.jit import borrowed, kernel
 from particlesim.narrow_phase.contacts import wall_as_partner
 from particlesim.narrow_phase.gjk import NO_CORNERS
-from particlesim.vec import put, put4, row
+from particlesim.vec import grown, put, put4, row
 
 
 @kernel

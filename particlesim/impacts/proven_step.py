@@ -68,17 +68,23 @@ def _proven_step(vertex, range_i, way_i, range_j, way_j, gap, parting, bend, mos
 
 
 @kernel
-def _facing_edge(vertex, first, last, direction):
-    """From the vertex that reaches farthest along ``direction`` to the one that comes next."""
+def facing_edge(vertex, first, last, direction):
+    """From the vertex that reaches farthest along ``direction`` to the one that comes next.
+
+    Returns how far the second and the third lag behind the first as well: (edge, lag, lag).
+    """
     best = second = first
-    reach = nearly = -math.inf
+    reach = nearly = hardly = -math.inf
     for v in range(first, last):
         r = dot(row(vertex, v), direction)
         if r > reach:
-            best, second, reach, nearly = v, best, r, reach
+            best, second, reach, nearly, hardly = v, best, r, reach, nearly
         elif r > nearly:
-            second, nearly = v, r
-    return sub(row(vertex, second), row(vertex, best)) if first < last else (0.0, 0.0, 0.0)
+            second, nearly, hardly = v, r, nearly
+        else:
+            hardly = max(hardly, r)
+    edge = sub(row(vertex, second), row(vertex, best)) if first < last else (0.0, 0.0, 0.0)
+    return edge, reach - nearly, reach - hardly
 
 
 @kernel
@@ -131,8 +137,8 @@ def _turning_of(way, vertex, range_i, body_i, range_j, body_j, normal):
     with_i, with_j = cross(body_i[2], normal), cross(body_j[2], normal)
     if way != _WITH_EDGES:
         return with_i if way == _WITH_FIRST else with_j
-    edge_i = _facing_edge(vertex, range_i[0], range_i[1], rotate_back(body_i[1], normal))
-    edge_j = _facing_edge(vertex, range_j[0], range_j[1], rotate_back(body_j[1], scaled(normal, -1.0)))
+    edge_i, _, _ = facing_edge(vertex, range_i[0], range_i[1], rotate_back(body_i[1], normal))
+    edge_j, _, _ = facing_edge(vertex, range_j[0], range_j[1], rotate_back(body_j[1], scaled(normal, -1.0)))
     return turning_with_edges(rotate(body_i[1], edge_i), with_i, rotate(body_j[1], edge_j), with_j, normal)
 
 

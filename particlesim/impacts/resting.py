@@ -7,20 +7,14 @@ whole stretch of time (see settling.py).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from particlesim.constants import FREE, RESTING_DROP
-from particlesim.impacts.cluster import (
-    APART,
-    FASTER,
-    LEVER_I,
-    bend_more,
-    expected_paces,
-    find_cluster,
-    handed_down,
-    surface_paces,
-    walk,
-)
+from particlesim.impacts.cluster import expected_paces, find_cluster, surface_paces, walk
+from particlesim.impacts.contact_points import APART, FASTER, LEVER_I, handed_down
+from particlesim.impacts.lookahead import fly, sunk_points
 from particlesim.impacts.neighbours import Neighbours
 from particlesim.impacts.settling import settle
 from particlesim.motion import spins
@@ -34,11 +28,22 @@ _SHORTEST_STRETCH = 0.25
 # What lies still is thought to become this much faster by others than by gravity in a stretch.
 _HASTE = 4.0
 
-# How often velocities are sought anew because bodies turn otherwise by what they are given, and gaps close otherwise.
-_MOST_BENDINGS = 4
+# How often velocities are sought in a stretch, as with those of before bodies would have sunk in.
+_MOST_LOOKS_AHEAD = 5
 
 # Looks at who may meet whom in a stretch, until no body becomes faster than was thought.
 _MAX_LOOKS = 5
+
+
+class _Settled(NamedTuple):
+    """Contact points and what goes through them in a stretch."""
+
+    partner: np.ndarray  # (m, 2) int64
+    point: np.ndarray  # (m, COLUMNS)
+    impulse: np.ndarray  # (m,) [N s]
+    steady: np.ndarray  # (m,) without what makes points part again [N s]
+    spin: np.ndarray  # (n, 3) angular velocities with these impulses [rad/s]
+    done: bool  # whether the impulses are good enough
 
 
 class Resting:
@@ -58,6 +63,7 @@ class Resting:
         # Without gravity nothing is held, and nothing need be remembered of anybody.
         known = count if self._gravity else 0
         self._seen = state.position[:known].copy(), state.orientation[:known].copy()
+        self._ahead = State(*(array[:known].copy() for array in state))
         self._way = np.zeros(known)
         self._neighbours: Neighbours | None = None
         self._clearance = np.empty(0)
@@ -102,22 +108,21 @@ class Resting:
             )  # fmt: skip
             if not len(partner):
                 return
-            contact = partner[:, 0] * (len(pace) + 6) + partner[:, 1] + 6
-            impulse = self._forces_of(contact, point) * duration
-            impulse, steady, turning, done = self._settle(partner, point, spin, duration, before, impulse, acceleration)
-            self._contact, self._force = contact, steady / duration
-            self._lever = point[:, LEVER_I : LEVER_I + 3].copy()
-            reached = surface_paces(constants, state, turning)
+            impulse = self._forces_of(self._contact_of(partner), point) * duration
+            settled = self._settle(partner, point, spin, duration, before, impulse, acceleration)
+            self._contact, self._force = self._contact_of(settled.partner), settled.steady / duration
+            self._lever = settled.point[:, LEVER_I : LEVER_I + 3].copy()
+            reached = surface_paces(constants, state, settled.spin)
             self._fastest = float(reached[self._held].max(initial=0.0))
             foreseen = bool((reached <= FASTER * pace).all())
-            self.unresolved = not (done and foreseen)
+            self.unresolved = not (settled.done and foreseen)
             if foreseen or look == _MAX_LOOKS:
                 break
             np.maximum(pace, FASTER * reached, out=pace)
             self._undo(acceleration)
-        on_wall = partner[:, 1] < 0
-        self.wall_impulse = np.bincount(-1 - partner[on_wall, 1], impulse[on_wall], minlength=6)
-        self.virial = float((impulse * point[:, APART])[~on_wall].sum())
+        on_wall = settled.partner[:, 1] < 0
+        self.wall_impulse = np.bincount(-1 - settled.partner[on_wall, 1], settled.impulse[on_wall], minlength=6)
+        self.virial = float((settled.impulse * settled.point[:, APART])[~on_wall].sum())
 
     def _settle(
         self,
@@ -128,26 +133,22 @@ class Resting:
         before: tuple[np.ndarray, np.ndarray],
         impulse: np.ndarray,
         acceleration: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-        """Let bodies settle, and anew where they then turn so that gaps close otherwise than was thought.
-
-        Returns the impulses, those without what makes points part again, the angular velocities, and whether the
-        impulses are good enough.
-        """
+    ) -> _Settled:
+        """Let bodies settle, and anew with more contact points where they would have sunk in at the end."""
         where = self._table, self._world, self._constants, self._state
-        for bending in range(_MOST_BENDINGS):
+        for look in range(1, _MOST_LOOKS_AHEAD + 1):
             pressed, done, steady = settle(*where[1:], spin, partner, point, duration, impulse, acceleration)
             self._held = np.flatnonzero(pressed)
             self._before = before[0][self._held], before[1][self._held]
             turning = spins(self._constants, self._state)
-            if not bend_more(*where, turning, partner, point, duration):
+            fly(self._constants, self._state, acceleration, duration, self._ahead)
+            more, of, place = sunk_points(*where, self._ahead, turning, (before[0], spin), partner, point, duration)
+            if not len(more) or look == _MOST_LOOKS_AHEAD:
                 break
-            if bending + 1 == _MOST_BENDINGS:
-                done = False
-                break
+            partner, point = np.insert(partner, place, of, axis=0), np.insert(point, place, more, axis=0)
+            impulse = np.insert(steady, place, 0.0)
             self._undo(acceleration)
-            impulse = steady
-        return impulse, steady, turning, done
+        return _Settled(partner, point, impulse, steady, turning, done and not len(more))
 
     def _keep_clearance(self, neighbours: Neighbours) -> None:
         """Bring up to date how far surfaces have come; of new neighbours nothing is known yet."""
@@ -164,6 +165,10 @@ class Resting:
         """Undo what the last ``hold`` did to the state."""
         if len(self._held):
             self._state.velocity[self._held], self._state.angular_momentum[self._held] = self._before
+
+    def _contact_of(self, partner: np.ndarray) -> np.ndarray:
+        """A number for the partners at each contact point."""
+        return partner[:, 0] * (len(self._constants.mass) + 6) + partner[:, 1] + 6
 
     def _forces_of(self, contact: np.ndarray, point: np.ndarray) -> np.ndarray:
         """The forces [N] that these contact points had in the stretch before; 0 for new ones."""

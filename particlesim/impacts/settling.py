@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from particlesim.impacts.cluster import (
+from particlesim.impacts.contact_points import (
     BEND,
     GAP,
     INRADIUS,

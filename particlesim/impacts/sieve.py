@@ -21,16 +21,6 @@ from particlesim.vec import dot, norm, row, sub
 
 
 @kernel
-def grown(array):
-    """The array with as much room again."""
-    longer = np.empty((2 * array.shape[0], array.shape[1]), dtype=array.dtype)
-    for k in range(array.shape[0]):
-        for column in range(array.shape[1]):
-            longer[k, column] = array[k, column]
-    return longer
-
-
-@kernel
 def free_way(velocity, acceleration, time):
     """How far a particle goes within ``time`` [s] at the most."""
     return (norm(velocity) + 0.5 * norm(acceleration) * time) * time
