@@ -44,7 +44,7 @@ from particlesim.vec import along, dot, put, row, sub, vector
 _VISITS = 30_000
 _ROUNDS = 12
 _MOST_ROUNDS = 500
-_URGENT = 1.2e-5
+_URGENT = 2.4e-5
 
 # Rounds end when no speed at a contact point changes by more than this fraction of what gravity adds in the stretch.
 _CONVERGED = 1e-9
@@ -116,14 +116,33 @@ def _go_round(partner, point, lightness, wanted, slack, duration, upwards, motio
 
 
 @kernel
-def _go_on(array, before, way, share):
-    """Go on from ``before`` to ``array`` and on along the ``way`` of the round before, by a ``share`` of it."""
+def _sinking(partner, point, wanted, slack, duration, motion):
+    """How much farther than its ``slack`` [m] any point sinks in, as a fraction of the inscribed radius."""
+    most = 0.0
+    for k in range(len(wanted)):
+        i, j = _rows_of(partner, k, len(motion) - 1)
+        lack = wanted[k] - _parting(motion, point, i, j, k)
+        most = max(most, (lack * duration - slack[k]) / point[k, INRADIUS])
+    return most
+
+
+@kernel
+def _go_on(array, before, share):
+    """Go on from ``before`` to ``array``, and on along this way by a ``share`` of it."""
     for k in range(array.shape[0]):
         for axis in range(array.shape[1]):
-            more = share * way[k, axis]
-            way[k, axis] = array[k, axis] - before[k, axis] + more
-            array[k, axis] += more
-            before[k, axis] = array[k, axis]
+            reached = array[k, axis]
+            array[k, axis] += share * (reached - before[k, axis])
+            before[k, axis] = reached
+
+
+@kernel
+def _turned_back(point, impulse, begun, before):
+    """Whether the rounds that began at impulses ``begun`` went back on the way there from ``before``."""
+    along_way = 0.0
+    for k in range(len(impulse)):
+        along_way += (impulse[k, 0] - begun[k, 0]) * (impulse[k, 0] - before[k, 0]) / point[k, MASS]
+    return along_way < 0.0
 
 
 @kernel
@@ -131,29 +150,40 @@ def _press(partner, point, lightness, wanted, slack, small, duration, motion, im
     """Change ``impulse`` (m, 1) and ``motion`` until partners part at each point at the speed ``wanted`` at least.
 
     ``motion`` (n + 1, 6) are velocities and spins, with a row for the walls; ``lightness`` (n + 1,) is 1 / mass.
-    Rounds go up and down by turns: what bears on a heap from above is soon known at its foot. Each goes on along the
-    way of the one before, as conjugate gradients do (M. Silcowitz-Hansen, S. Niebe, K. Erleben, The Visual Computer 26
-    (2010) 893-901), which needs a third of the rounds. Returns whether no point sinks in too far.
+    Rounds go up and down by turns: what bears on a heap from above is soon known at its foot. Two such rounds are as a
+    step along a gradient, and go on along the way of those before (Y. Nesterov, Soviet Mathematics Doklady 27 (1983)
+    372-376; for contacts H. Mazhar, T. Heyn, D. Negrut, A. Tasora, ACM Transactions on Graphics 34 (2015) 32) until
+    they turn back (B. O'Donoghue, E. Candes, Foundations of Computational Mathematics 15 (2015) 715-732). In heaps that
+    needs a third to a seventh of the rounds. Returns whether no point sinks in too far.
     """
-    pushed, moved = impulse.copy(), motion.copy()
-    way, way_moved = np.zeros(impulse.shape), np.zeros(motion.shape)
-    last = 0.0
-    least = max(_VISITS // max(len(impulse), 1), _ROUNDS)
-    for turn in range(_MOST_ROUNDS):
-        change, sinking = _go_round(
-            partner, point, lightness, wanted, slack, duration, turn % 2 == 0, motion, impulse[:, 0]
-        )
-        if change <= small or (sinking <= _URGENT and turn + 1 >= min(least, _MOST_ROUNDS)):
+    pushed, moved, begun = impulse.copy(), motion.copy(), impulse.copy()
+    least = min(max(_VISITS // max(len(impulse), 1), _ROUNDS), _MOST_ROUNDS)
+    pace = 1.0
+    for turn in range(2, _MOST_ROUNDS + 1, 2):
+        sinking = 0.0
+        for upwards in (True, False):
+            change, seen = _go_round(partner, point, lightness, wanted, slack, duration, upwards, motion, impulse[:, 0])
+            sinking = max(sinking, seen)
+        if change <= small:
             return True
-        if turn + 1 == _MOST_ROUNDS:
+        # Those visited early may have sunk in since.
+        if (
+            sinking <= _URGENT
+            and turn >= least
+            and _sinking(partner, point, wanted, slack, duration, motion) <= _URGENT
+        ):
+            return True
+        if turn == _MOST_ROUNDS:
             break
-        size = 0.0
+        if _turned_back(point, impulse, begun, pushed):
+            pace = 1.0
+        faster = 0.5 + math.sqrt(0.25 + pace * pace)
+        share = (pace - 1.0) / faster
+        pace = faster
+        _go_on(impulse, pushed, share)
+        _go_on(motion, moved, share)
         for k in range(len(impulse)):
-            size += (impulse[k, 0] - pushed[k, 0]) ** 2 / point[k, MASS]
-        share = size / last if size < last else 0.0
-        _go_on(impulse, pushed, way, share)
-        _go_on(motion, moved, way_moved, share)
-        last = size
+            begun[k, 0] = impulse[k, 0]
     return False
 
 
