@@ -39,8 +39,8 @@ from particlesim.vec import along, dot, put, row, sub, vector
 # Rounds over all contact points in a stretch: as many as make this number of visits to points, which takes a
 # millisecond, but _ROUNDS at least. Thus few points, such as those of a tower, are done to rounding; a large heap
 # starts from the forces of the stretch before, and gets better from one to the next. There are more rounds while some
-# point would sink in farther than it may by more than a fraction _URGENT of the inscribed radius. Few stretches need
-# _MOST_ROUNDS: of a pour of 2,000 spheres one in two hundred.
+# point would sink in farther than it may by more than a fraction _URGENT of the inscribed radius. Hardly a stretch
+# needs _MOST_ROUNDS: of a pour of 2,001 bodies one in ten thousand.
 _VISITS = 30_000
 _ROUNDS = 12
 _MOST_ROUNDS = 500
@@ -53,11 +53,12 @@ _CONVERGED = 1e-9
 _ROUNDING = 1e-13
 
 # Bodies come to rest this fraction of the inscribed radius apart. What rounds leave undone they sink into this slack
-# first, and into each other by about _DEEP. Neither can be seen; what touches is nearer than RESTING_DROP. In one
-# stretch a point may sink by a part _SHARE of the way that is left to it. Where none is left, all but a tenth of what
-# _URGENT leaves free is taken away: in a heap that is nearly at rest nothing gives the energy to lift what has sunk.
+# first, and into each other by _DEEP and a few times _URGENT. Neither can be seen; what touches is nearer than
+# RESTING_DROP. In one stretch a point may sink by a part _SHARE of the way that is left to it. Where none is left, all
+# but a tenth of what _URGENT leaves free is taken away: in a heap that is nearly at rest nothing gives the energy to
+# lift what has sunk.
 _SLACK = 2e-4
-_DEEP = 7e-5
+_DEEP = 3e-5
 _SHARE = 0.25
 _LEAST = -0.9 * _URGENT
 
