@@ -25,6 +25,7 @@ def nearly_touching(seed, shapes):
         if gap <= 1e-5:
             break
         state.position[1] -= 0.99 * (gap - 5e-6) * way
+    assert gap <= 1e-5
     state.velocity[:] = rng.normal(scale=0.5, size=(2, 3))
     state.angular_momentum[:] = rng.normal(scale=10.0, size=(2, 3)) * sim.constants.inertia.mean(axis=1)[:, None]
     return sim

@@ -21,8 +21,8 @@ _LEVEL = 1e-6
 def _edge_facing(table, shape, turn, direction):
     """The edge of a hull that faces ``direction``, in world axes; (0, 0, 0) if a corner or a face does."""
     first, last = table.vertex_start[shape], table.vertex_start[shape + 1]
-    edge, second, third = facing_edge(table.vertex, first, last, rotate_back(turn, direction))
-    return rotate(turn, edge) if second <= _LEVEL < third else _STILL
+    edge, lag, next_lag = facing_edge(table.vertex, first, last, rotate_back(turn, direction))
+    return rotate(turn, edge) if lag <= _LEVEL < next_lag else _STILL
 
 
 @kernel

@@ -14,19 +14,7 @@ from particlesim.jit import borrowed, kernel
 from particlesim.narrow_phase.contacts import wall_as_partner
 from particlesim.narrow_phase.pair import nearest_image
 from particlesim.narrow_phase.walls import wall_normal
-from particlesim.vec import (
-    conjugate,
-    dot,
-    grown,
-    norm,
-    put,
-    put4,
-    quaternion_product,
-    row,
-    row4,
-    sub,
-    vector,
-)
+from particlesim.vec import conjugate, dot, grown, norm, put, put4, quaternion_product, row, row4, sub, vector
 
 # The fraction of a neighbour's speed that a body is expected to take on. With FASTER nearly all are foreseen; the rest
 # costs a second look at everything.

@@ -24,6 +24,7 @@ from particlesim.vec import apply, cross, dot, matrix_of, norm, put, row, row4, 
 # Columns of a contact point: normal, what a unit impulse does to the two angular momenta and the two spins, effective
 # mass, gap [m], how fast the partners part [m/s], their restitution, the speed below which they come to rest, the
 # smaller inscribed radius, how far apart the centroids are along the normal, how far turning may close the gap [m].
+# A gap that turning may close is opened at once.
 NORMAL, LEVER_I, LEVER_J, TWIST_I, TWIST_J = 0, 3, 6, 9, 12
 MASS, GAP, PARTING, RESTITUTION, SLOW, INRADIUS, APART, BEND = 15, 16, 17, 18, 19, 20, 21, 22
 COLUMNS = 23
@@ -137,7 +138,7 @@ def parting_at(velocity, spin, i, j, point, k):
 
 
 @kernel
-def write(constants, state, i, j, normal, offset, arm, inradius, restitution, slow, m, partner, point):
+def write_point(constants, state, i, j, normal, offset, arm, inradius, restitution, slow, m, partner, point):
     """Write contact point ``m`` of particle i and partner j, but for its gap and how fast it parts and may bend."""
     partner[m, 0], partner[m, 1] = i, j
     _put_column(point, m, NORMAL, normal)
@@ -190,7 +191,7 @@ def add_contact(table, world, constants, state, spin, pace, duration, i, j, clea
     for k in range(count):
         m = size + k
         arm = row(points, k)
-        write(constants, state, i, j, normal, offset, arm, inradius, restitution, slow, m, partner, point)
+        write_point(constants, state, i, j, normal, offset, arm, inradius, restitution, slow, m, partner, point)
         parting = parting_at(state.velocity, spin, i, j, point, m)
         if lossless and abs(parting) > slow:
             return size, LOOSE, clear

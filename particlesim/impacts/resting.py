@@ -28,11 +28,11 @@ _SHORTEST_STRETCH = 0.25
 # What lies still is thought to become this much faster by others than by gravity in a stretch.
 _HASTE = 4.0
 
-# How often velocities are sought in a stretch, as with those of before bodies would have sunk in.
-_MOST_LOOKS_AHEAD = 5
-
 # Looks at who may meet whom in a stretch, until no body becomes faster than was thought.
 _MAX_LOOKS = 5
+
+# How often velocities are sought in each of these looks, as long as bodies would sink in with those that were found.
+_MOST_ATTEMPTS = 5
 
 
 class _Settled(NamedTuple):
@@ -136,14 +136,14 @@ class Resting:
     ) -> _Settled:
         """Let bodies settle, and anew with more contact points where they would have sunk in at the end."""
         where = self._table, self._world, self._constants, self._state
-        for look in range(1, _MOST_LOOKS_AHEAD + 1):
+        for attempt in range(1, _MOST_ATTEMPTS + 1):
             pressed, done, steady = settle(*where[1:], spin, partner, point, duration, impulse, acceleration)
             self._held = np.flatnonzero(pressed)
             self._before = before[0][self._held], before[1][self._held]
             turning = spins(self._constants, self._state)
-            fly(self._constants, self._state, acceleration, duration, self._ahead)
+            fly(self._constants, self._state, acceleration, self.standing, duration, self._ahead)
             more, of, place = sunk_points(*where, self._ahead, turning, (before[0], spin), partner, point, duration)
-            if not len(more) or look == _MOST_LOOKS_AHEAD:
+            if not len(more) or attempt == _MOST_ATTEMPTS:
                 break
             partner, point = np.insert(partner, place, of, axis=0), np.insert(point, place, more, axis=0)
             impulse = np.insert(steady, place, 0.0)

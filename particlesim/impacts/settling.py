@@ -95,14 +95,13 @@ def _parting(motion, point, i, j, k):
 
 
 @kernel
-def _go_round(partner, point, lightness, wanted, slack, duration, upwards, motion, impulse):
+def _go_round(partner, point, lightness, wanted, upwards, motion, impulse):
     """Let each contact point in turn part at the speed ``wanted`` at least, as far as pushing and not pulling does it.
 
-    Returns the largest change of such a speed, and how much farther than its ``slack`` [m] a point would have sunk in,
-    as a fraction of the inscribed radius.
+    Returns the largest change of such a speed.
     """
     count, walls = len(impulse), len(motion) - 1
-    change = sinking = 0.0
+    change = 0.0
     for step in range(count):
         k = step if upwards else count - 1 - step
         i, j = _rows_of(partner, k, walls)
@@ -112,8 +111,7 @@ def _go_round(partner, point, lightness, wanted, slack, duration, upwards, motio
             _push(motion, lightness, point, i, j, k, more)
             impulse[k] += more
             change = max(change, abs(more) / point[k, MASS])
-            sinking = max(sinking, (lack * duration - slack[k]) / point[k, INRADIUS])
-    return change, sinking
+    return change
 
 
 @kernel
@@ -128,9 +126,20 @@ def _sinking(partner, point, wanted, slack, duration, motion):
 
 
 @kernel
-def _go_on(array, before, share):
-    """Go on from ``before`` to ``array``, and on along this way by a ``share`` of it."""
-    for k in range(array.shape[0]):
+def _bodies(partner, count):
+    """Those of ``count`` bodies that have a contact point."""
+    listed = np.zeros(count, dtype=np.bool_)
+    for k in range(len(partner)):
+        for side in range(2):
+            if partner[k, side] >= 0:
+                listed[partner[k, side]] = True
+    return np.flatnonzero(listed)
+
+
+@kernel
+def _go_on(array, before, rows, share):
+    """Go on along the way from ``before`` to ``array``, by a ``share`` of it; ``before`` becomes what was reached."""
+    for k in rows:
         for axis in range(array.shape[1]):
             reached = array[k, axis]
             array[k, axis] += share * (reached - before[k, axis])
@@ -158,33 +167,24 @@ def _press(partner, point, lightness, wanted, slack, small, duration, motion, im
     needs a third to a seventh of the rounds. Returns whether no point sinks in too far.
     """
     pushed, moved, begun = impulse.copy(), motion.copy(), impulse.copy()
+    points, bodies = np.arange(len(impulse)), _bodies(partner, len(lightness))
     least = min(max(_VISITS // max(len(impulse), 1), _ROUNDS), _MOST_ROUNDS)
     pace = 1.0
     for turn in range(2, _MOST_ROUNDS + 1, 2):
-        sinking = 0.0
         for upwards in (True, False):
-            change, seen = _go_round(partner, point, lightness, wanted, slack, duration, upwards, motion, impulse[:, 0])
-            sinking = max(sinking, seen)
+            change = _go_round(partner, point, lightness, wanted, upwards, motion, impulse[:, 0])
         if change <= small:
             return True
-        # Those visited early may have sunk in since.
-        if (
-            sinking <= _URGENT
-            and turn >= least
-            and _sinking(partner, point, wanted, slack, duration, motion) <= _URGENT
-        ):
+        if turn >= least and _sinking(partner, point, wanted, slack, duration, motion) <= _URGENT:
             return True
-        if turn == _MOST_ROUNDS:
-            break
         if _turned_back(point, impulse, begun, pushed):
             pace = 1.0
         faster = 0.5 + math.sqrt(0.25 + pace * pace)
-        share = (pace - 1.0) / faster
+        share = (pace - 1.0) / faster if turn < _MOST_ROUNDS else 0.0
         pace = faster
-        _go_on(impulse, pushed, share)
-        _go_on(motion, moved, share)
-        for k in range(len(impulse)):
-            begun[k, 0] = impulse[k, 0]
+        _go_on(impulse, pushed, points, share)
+        _go_on(motion, moved, bodies, share)
+        begun[:] = impulse
     return False
 
 
