@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from particlesim.constants import MAX_MANIFOLD
+from particlesim.constants import MAX_MANIFOLD, SETTLES
 from particlesim.impacts.bending import bend
-from particlesim.motion import free_path, spins
+from particlesim.impacts.lookahead import fly
+from particlesim.motion import spins
 from particlesim.narrow_phase.contacts import contact_now
 from tests.touching import nearly_touching
 
@@ -14,13 +15,8 @@ DURATION = 4e-4
 
 def later(sim, points):
     """Separation, normal and nearest point after DURATION."""
-    state, c = sim.state, sim.constants
-    for i in range(2):
-        path = [tuple(array[i]) for array in (state.position, state.orientation, state.velocity)]
-        momentum, moments = tuple(state.angular_momentum[i]), tuple(c.inertia[i])
-        x, q, _ = free_path(*path, momentum, moments, (0.0, 0.0, 0.0), DURATION)
-        state.position[i], state.orientation[i] = x, q
-    gap, normal, _, _ = contact_now(sim.table, sim.world, c, state, 0, 1, points)
+    fly(sim.constants, sim.state, np.zeros((2, 3)), np.full(2, SETTLES), DURATION, sim.state)
+    gap, normal, _, _ = contact_now(sim.table, sim.world, sim.constants, sim.state, 0, 1, points)
     return gap, np.array(normal), points[0].copy()
 
 
