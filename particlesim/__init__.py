@@ -19,35 +19,35 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from particlesim.broad_phase import find_pairs
-    from particlesim.ledger import Ledger
-    from particlesim.narrow_phase import Pose, Separation, separation
-    from particlesim.pipeline import render, simulate
+    from particlesim.geometry.separation import Pose, Separation, separation
+    from particlesim.geometry.shapes import CATALOGUE, Shape
+    from particlesim.jobs.movie import render, simulate, still
     from particlesim.rendering import RenderError
     from particlesim.scene import Scene
     from particlesim.scene.file import SceneError, load_scene
-    from particlesim.shapes import CATALOGUE, Shape
-    from particlesim.simulation import Simulation, SimulationError
-    from particlesim.trajectory import Trajectory, TrajectoryError
+    from particlesim.simulation.diagnostics import Ledger
+    from particlesim.simulation.simulation import Simulation, SimulationError
+    from particlesim.trajectory.gsd_file import Trajectory, TrajectoryError
 
 _HOMES = {
-    "CATALOGUE": "shapes",
-    "Ledger": "ledger",
-    "Pose": "narrow_phase",
+    "CATALOGUE": "geometry.shapes",
+    "Ledger": "simulation.diagnostics",
+    "Pose": "geometry.separation",
     "RenderError": "rendering",
     "Scene": "scene",
     "SceneError": "scene.file",
-    "Separation": "narrow_phase",
-    "Shape": "shapes",
-    "Simulation": "simulation",
-    "SimulationError": "simulation",
-    "Trajectory": "trajectory",
-    "TrajectoryError": "trajectory",
+    "Separation": "geometry.separation",
+    "Shape": "geometry.shapes",
+    "Simulation": "simulation.simulation",
+    "SimulationError": "simulation.simulation",
+    "Trajectory": "trajectory.gsd_file",
+    "TrajectoryError": "trajectory.gsd_file",
     "find_pairs": "broad_phase",
     "load_scene": "scene.file",
-    "render": "pipeline",
-    "separation": "narrow_phase",
-    "simulate": "pipeline",
-    "still": "pipeline",
+    "render": "jobs.movie",
+    "separation": "geometry.separation",
+    "simulate": "jobs.movie",
+    "still": "jobs.movie",
 }
 
 __all__ = [

@@ -1,6 +1,6 @@
 """``python -m particlesim``."""
 
-from particlesim.cli import main
+from particlesim.cli.main import main
 
 if __name__ == "__main__":
     main()

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from particlesim.simulation import Simulation
+from particlesim.simulation.simulation import Simulation
 from tests.worlds import scene
 
 

@@ -1,16 +1,16 @@
-"""Who sees what, told ray by ray: an independent answer to the questions of ``particlesim.rendering.visibility``."""
+"""Who sees what, told ray by ray: an independent answer to ``particlesim.rendering.visibility``."""
 
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from particlesim import shapes
-from particlesim.constants import SPHERE
-from particlesim.rendering.bodies import bodies_of
-from particlesim.rendering.groups import grouped
-from particlesim.rendering.outlook import Outlook
-from particlesim.trajectory import Header
+from particlesim.core.constants import SPHERE
+from particlesim.geometry import shapes
+from particlesim.rendering.visibility.geometry_tables import bodies_of
+from particlesim.rendering.visibility.occlusion_clusters import grouped
+from particlesim.rendering.visibility.projection import Outlook
+from particlesim.trajectory.gsd_file import Header
 
 KINDS = shapes.sphere(), shapes.cube(), shapes.pyramid()
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from particlesim import bench, cli
-from particlesim.simulation import Simulation
+from particlesim.benchmarks import steps as bench
+from particlesim.cli import main as cli
+from particlesim.simulation.simulation import Simulation
 
 
 def run(*arguments):
@@ -54,7 +55,7 @@ def test_the_command_prints_a_table_and_writes_the_figures(tmp_path, monkeypatch
             progress("spheres, 1,000 particles", 0, 3)
         return iter([few, speed])
 
-    monkeypatch.setattr("particlesim.bench.run", measure)
+    monkeypatch.setattr("particlesim.benchmarks.steps.run", measure)
     result = run("--threads", "2", "--json", str(tmp_path / "speed.json"))
     assert result.exit_code == 0
     assert result.stderr == "spheres, 1,000 particles 3 measurements\n"
@@ -101,7 +102,7 @@ def test_wrong_input_is_one_line(arguments, line, tmp_path, monkeypatch):
 
 
 def test_too_many_particles_are_refused_at_once(monkeypatch):
-    monkeypatch.setattr("particlesim.build._memory", lambda: 1e6)
+    monkeypatch.setattr("particlesim.setup.build._memory", lambda: 1e6)
     result = run("--quiet")
     assert result.exit_code == 2
     assert "100,000 particles need about" in result.output

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from particlesim.constants import MAX_MANIFOLD, SETTLES
-from particlesim.impacts.bending import bend
-from particlesim.impacts.lookahead import fly
-from particlesim.motion import spins
-from particlesim.narrow_phase.contacts import contact_now
+from particlesim.core.constants import MAX_MANIFOLD, SETTLES
+from particlesim.dynamics.contact.curvature_margin import bend
+from particlesim.dynamics.contact.end_of_step_correction import fly
+from particlesim.model.free_motion import spins
+from particlesim.model.touching import contact_now
 from tests.touching import nearly_touching
 
 DURATION = 4e-4

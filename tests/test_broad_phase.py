@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from particlesim.broad_phase import METHODS, find_pairs
-from particlesim.crew import use_threads
+from particlesim.core.parallel import use_threads
 
 VARIANTS = {
     "naive": ("naive", {}),

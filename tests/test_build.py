@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
 import particlesim as ps
-from particlesim.build import build
-from particlesim.placement import lattice_points
+from particlesim.setup.build import build
+from particlesim.setup.placement import lattice_points
 
 BOX = {"size": [4.0, 4.0, 4.0]}
 

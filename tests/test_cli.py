@@ -11,9 +11,9 @@ import time
 import pytest
 from typer.testing import CliRunner
 
-from particlesim import cli
-from particlesim.diagnosis import Finding
-from particlesim.progress import shown_progress
+from particlesim.cli import main as cli
+from particlesim.cli.doctor import Finding
+from particlesim.cli.progress import shown_progress
 from particlesim.scene.file import SceneError
 
 SCENE = """
@@ -56,7 +56,7 @@ def files(folder):
 
 def test_help_loads_nothing_heavy():
     heavy = "{'numba', 'scipy', 'numpy', 'pydantic', 'rich', 'PIL', 'gsd', 'trimesh'}"
-    code = f"import sys, particlesim.cli; print(sorted({heavy} & set(sys.modules)))"
+    code = f"import sys, particlesim.cli.main; print(sorted({heavy} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
@@ -148,27 +148,27 @@ def failing(error):
 
 def test_bugs_are_not_hidden(folder, monkeypatch):
     for error in (ValueError("a bug"), RuntimeError("a bug"), KeyError("a bug")):
-        monkeypatch.setattr("particlesim.pipeline.simulate", failing(error))
+        monkeypatch.setattr("particlesim.jobs.movie.simulate", failing(error))
         result = run("simulate", "scene.toml")
         assert (result.exit_code, result.exception) == (1, error)
 
 
 def test_failures_of_the_machine_are_one_line(folder, monkeypatch):
-    monkeypatch.setattr("particlesim.pipeline.simulate", failing(OSError(28, "No space left on device", "run.gsd")))
+    monkeypatch.setattr("particlesim.jobs.movie.simulate", failing(OSError(28, "No space left on device", "run.gsd")))
     result = run("simulate", "scene.toml", "-q")
     assert (result.exit_code, result.output) == (1, "run.gsd: No space left on device\n")
-    monkeypatch.setattr("particlesim.pipeline.simulate", failing(SceneError("is odd", "world", 3)))
+    monkeypatch.setattr("particlesim.jobs.movie.simulate", failing(SceneError("is odd", "world", 3)))
     assert run("simulate", "scene.toml", "-q").output == "scene.toml: world = 3: is odd\n"
     assert files(folder) == ["scene.toml"]
 
 
 def test_the_doctor_ends_with_the_fix_on_a_line_of_its_own(monkeypatch):
     fix = "OpenGL is missing: install it with: apt-get install -y --no-install-recommends libegl1 libgl1"
-    monkeypatch.setattr("particlesim.diagnosis.diagnose", lambda: [Finding("OpenGL", False, fix)])
+    monkeypatch.setattr("particlesim.cli.doctor.diagnose", lambda: [Finding("OpenGL", False, fix)])
     result = run("doctor")
     assert (result.exit_code, result.stderr) == (1, f"OpenGL: {fix}\n")
     assert "missing, see below" in result.stdout
-    monkeypatch.setattr("particlesim.diagnosis.diagnose", lambda: [Finding("OpenGL", True, "there")])
+    monkeypatch.setattr("particlesim.cli.doctor.diagnose", lambda: [Finding("OpenGL", True, "there")])
     assert run("doctor").exit_code == 0
 
 

@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import brentq
 
 from particlesim import crew
-from particlesim.constants import LONGEST_STRETCH
-from particlesim.narrow_phase.contacts import deepest_overlap
-from particlesim.simulation import Simulation
+from particlesim.core.constants import LONGEST_STRETCH
+from particlesim.model.touching import deepest_overlap
+from particlesim.simulation.simulation import Simulation
 from tests.brute_force import Spheres
 from tests.gases import spheres
 from tests.worlds import gas, listed, scene

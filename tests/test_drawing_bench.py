@@ -8,8 +8,9 @@ import pytest
 from scipy.spatial import cKDTree
 from typer.testing import CliRunner
 
-from particlesim import cli, drawing_bench
-from particlesim.shapes import CATALOGUE
+from particlesim.benchmarks import drawing as drawing_bench
+from particlesim.cli import main as cli
+from particlesim.geometry.shapes import CATALOGUE
 
 
 def run(*arguments):

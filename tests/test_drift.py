@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from particlesim import cli
-from particlesim.summary import Summary
+from particlesim.cli import main as cli
+from particlesim.jobs.summary import Summary
 
 SCENE = """
 duration = 0.4

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from particlesim.simulation import Simulation
+from particlesim.simulation.simulation import Simulation
 from tests.gases import (
     blocks,
     carnahan_starling,

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.jit import borrowed, kernel
+from particlesim.core.jit import borrowed, kernel
 
 
 class Things(NamedTuple):

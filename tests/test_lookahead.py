@@ -3,12 +3,22 @@
 import numpy as np
 import pytest
 
-from particlesim.constants import MAX_MANIFOLD, SETTLES
-from particlesim.impacts.contact_points import BEND, COLUMNS, GAP, INRADIUS, LEVER_I, LEVER_J, MASS, NORMAL, parting_at
-from particlesim.impacts.lookahead import fly, sunk_points
-from particlesim.motion import spins
-from particlesim.narrow_phase.contacts import contact_now
-from particlesim.state import State
+from particlesim.core.constants import MAX_MANIFOLD, SETTLES
+from particlesim.dynamics.contact.contact_points import (
+    BEND,
+    COLUMNS,
+    GAP,
+    INRADIUS,
+    LEVER_I,
+    LEVER_J,
+    MASS,
+    NORMAL,
+    parting_at,
+)
+from particlesim.dynamics.contact.end_of_step_correction import fly, sunk_points
+from particlesim.model.bodies import State
+from particlesim.model.free_motion import spins
+from particlesim.model.touching import contact_now
 from tests.touching import nearly_touching
 
 DURATION = 1e-3

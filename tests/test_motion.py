@@ -6,8 +6,8 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
-from particlesim.motion import free_rotation, spin_of
-from particlesim.simulation import Simulation
+from particlesim.model.free_motion import free_rotation, spin_of
+from particlesim.simulation.simulation import Simulation
 from tests.worlds import listed, scene
 
 STILL = (1.0, 0.0, 0.0, 0.0)

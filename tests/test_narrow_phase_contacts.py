@@ -6,10 +6,11 @@ import numba
 import numpy as np
 import pytest
 
-from particlesim.constants import MAX_MANIFOLD, OPEN, PERIODIC, WALL
-from particlesim.crew import ALONE
-from particlesim.narrow_phase.contacts import contact_now, deepest_overlap, touching_pairs, touching_walls
-from particlesim.state import State, World, particle_constants, stack_shapes
+from particlesim.core.constants import MAX_MANIFOLD, OPEN, PERIODIC, WALL
+from particlesim.core.parallel import ALONE
+from particlesim.geometry.shape_table import stack_shapes
+from particlesim.model.bodies import State, World, particle_constants
+from particlesim.model.touching import contact_now, deepest_overlap, touching_pairs, touching_walls
 from tests import oracles
 from tests.oracles import unit_quaternion
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from particlesim.constants import MAX_MANIFOLD
-from particlesim.narrow_phase.hull_hull import hulls_nearer
-from particlesim.narrow_phase.pair import pair_contact
-from particlesim.state import stack_shapes
+from particlesim.core.constants import MAX_MANIFOLD
+from particlesim.geometry.narrow_phase.hull_hull import hulls_nearer
+from particlesim.geometry.narrow_phase.pair import pair_contact
+from particlesim.geometry.shape_table import stack_shapes
 from tests import oracles
 from tests.oracles import direction, unit_quaternion
 

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 import particlesim as ps
-from particlesim import shapes
+from particlesim.geometry import shapes
 from tests import oracles
 from tests.oracles import direction, unit_quaternion
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import particlesim as ps
-from particlesim import shapes
-from particlesim.constants import MAX_MANIFOLD
+from particlesim.core.constants import MAX_MANIFOLD
+from particlesim.geometry import shapes
 from tests import oracles
 from tests.oracles import direction, unit_quaternion
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from particlesim.geometry.shapes import sphere
 from particlesim.rendering.camera import FILL, Box, light_azimuth, subject_box, view_at
 from particlesim.scene import Scene
-from particlesim.shapes import sphere
-from particlesim.trajectory import Frame, Header
+from particlesim.trajectory.gsd_file import Frame, Header
 from tests.worlds import quick_twin
 
 SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))

@@ -5,8 +5,8 @@ from itertools import product
 import numpy as np
 
 from particlesim import shapes
-from particlesim.rendering.bodies import bodies_of
-from particlesim.rendering.cast import cast_of, images_of
+from particlesim.rendering.visibility.geometry_tables import bodies_of
+from particlesim.rendering.visibility.instances import cast_of, images_of
 from tests.test_render_picture import covered, draw, edge, make_frame, make_header, make_scene, seen
 
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from particlesim import shapes
-from particlesim.rendering import geometry
-from particlesim.rendering.cells import cell_lines
-from particlesim.rendering.colour import PALETTE, ParticleColours, map_colours, parse, shape_colours
-from particlesim.rendering.fields import field_of, figures
+from particlesim.rendering.gl import geometry
+from particlesim.rendering.octree_cells import cell_lines
+from particlesim.rendering.shading.colour import PALETTE, ParticleColours, map_colours, parse, shape_colours
+from particlesim.rendering.shading.fields import field_of, figures
 from particlesim.scene import Scene
-from particlesim.trajectory import Frame, Header
+from particlesim.trajectory.gsd_file import Frame, Header
 
 
 def header(kinds, shape, group=None):

@@ -6,8 +6,8 @@ import pytest
 from typer.testing import CliRunner
 
 import particlesim as ps
-from particlesim import cli
-from particlesim.scene.change import scaled, with_colour, with_look
+from particlesim.cli import main as cli
+from particlesim.scene.overrides import scaled, with_colour, with_look
 from tests.worlds import gas, listed, scene
 
 SCENE = """

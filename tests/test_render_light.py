@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from particlesim.rendering.ground import Ground
-from particlesim.rendering.sky import Sky
+from particlesim.rendering.shading.ambient_occlusion import Sky
+from particlesim.rendering.shading.floor import Ground
 
 HALF = np.array([3.0, 2.0])
 FLOOR = -1.0

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from particlesim.rendering import RenderError, movie, write_image, write_movie
-from particlesim.rendering.fade import faded, strength
+from particlesim.rendering.video.fade import faded, strength
 
 SIZE = (130, 98)  # even, but no multiples of the 16 pixels that encoders like
 

@@ -6,14 +6,14 @@ import pytest
 import particlesim as ps
 from particlesim import shapes
 from particlesim.broad_phase import METHODS
-from particlesim.extents import frame_boxes
-from particlesim.rendering.colour import PALETTE, ParticleColours, encoded, map_colours
-from particlesim.rendering.legend import swatches
-from particlesim.rendering.overlay import Overlay, legend_places
-from particlesim.rendering.panel import Panel, Style
-from particlesim.rendering.readout import Moment, Readout, energy_change, pressure
+from particlesim.rendering.hud.legend import swatches
+from particlesim.rendering.hud.overlay import Overlay, legend_places
+from particlesim.rendering.hud.panel import Panel, Style
+from particlesim.rendering.hud.readout import Moment, Readout, energy_change, pressure
+from particlesim.rendering.shading.colour import PALETTE, ParticleColours, encoded, map_colours
 from particlesim.scene import Scene
-from particlesim.trajectory import Frame, Header
+from particlesim.trajectory.frame_aabb import frame_boxes
+from particlesim.trajectory.gsd_file import Frame, Header
 from tests.gases import spheres
 from tests.worlds import gas
 

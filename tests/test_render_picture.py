@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from particlesim import shapes
-from particlesim.constants import SPHERE
+from particlesim.core.constants import SPHERE
+from particlesim.geometry import shapes
 from particlesim.rendering import Renderer
 from particlesim.scene import Scene
-from particlesim.trajectory import Frame, Header
+from particlesim.trajectory.gsd_file import Frame, Header
 
 WIDTH, HEIGHT = 320, 240
 EYE = np.array([10.0, 0.0, 0.0])

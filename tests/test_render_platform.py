@@ -10,10 +10,10 @@ from particlesim.rendering import RenderError, platform
 
 DRAW = """
 import numpy as np
-from particlesim import shapes
+from particlesim.geometry import shapes
 from particlesim.rendering import Renderer, RenderError
 from particlesim.scene import Scene
-from particlesim.trajectory import Frame, Header
+from particlesim.trajectory.gsd_file import Frame, Header
 scene = Scene(world={"size": (2, 2, 2)}, particles=[{"shape": "sphere", "count": 1}],
               movie={"resolution": (128, 96)})
 header = Header("", (shapes.sphere(),), np.zeros(1, int), np.ones(1), np.zeros(1, int),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from particlesim import shapes
-from particlesim.crew import use_threads
+from particlesim.core.parallel import use_threads
 from particlesim.rendering import Renderer
 from particlesim.rendering.quality import PRESETS
 from particlesim.scene import Scene

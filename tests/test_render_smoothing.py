@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from particlesim.crew import use_threads
-from particlesim.rendering.smoothing import smooth_edges
+from particlesim.core.parallel import use_threads
+from particlesim.rendering.shading.fxaa import smooth_edges
 
 
 def as_drawn(picture):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from particlesim.constants import SPHERE
-from particlesim.crew import use_threads
-from particlesim.rendering.groups import grouped
-from particlesim.rendering.surfaces import TILE, surfaces_of, table_of
-from particlesim.rendering.visibility import Sight, look
+from particlesim.core.constants import SPHERE
+from particlesim.core.parallel import use_threads
+from particlesim.rendering.shading.surfaces import TILE, surfaces_of, table_of
+from particlesim.rendering.visibility.occlusion_clusters import grouped
+from particlesim.rendering.visibility.rasterise import Sight, look
 from tests.sight import KINDS, crowd, outlook, rays, through
 
 VIEW = outlook((9.0, 3.0, 4.0))

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from particlesim.constants import SPHERE
-from particlesim.crew import use_threads
-from particlesim.rendering.lighting import key_light
-from particlesim.rendering.visibility import look
-from particlesim.shapes import cube, sphere
+from particlesim.core.constants import SPHERE
+from particlesim.core.parallel import use_threads
+from particlesim.geometry.shapes import cube, sphere
+from particlesim.rendering.shading.lighting import key_light
+from particlesim.rendering.visibility.rasterise import look
 from tests.sight import KINDS, Crowd, crowd, distances, outlook, rays, through
 from tests.test_render_picture import draw, edge, make_frame, make_scene
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from particlesim.simulation import Simulation
+from particlesim.simulation.simulation import Simulation
 from tests.worlds import gas, listed, scene
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from particlesim.simulation import Simulation
+from particlesim.simulation.simulation import Simulation
 from tests.worlds import listed, scene
 
 GRAVITY = (0.0, 0.0, -9.81)

@@ -4,7 +4,7 @@
 import pytest
 
 import particlesim as ps
-from particlesim.build import build
+from particlesim.setup.build import build
 
 WORLD = "[world]\nsize = [4.0, 4.0, 4.0]\n"
 GROUP = '[[particles]]\nshape = "sphere"\ncount = 10\nsize = 0.2\n'

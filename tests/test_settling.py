@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from particlesim import shapes
-from particlesim.constants import MAX_MANIFOLD
-from particlesim.impacts.contact_points import COLUMNS, LEVER_I, handed_down
-from particlesim.narrow_phase.manifold import hull_patch
-from particlesim.simulation import Simulation
-from particlesim.state import stack_shapes
-from particlesim.vec import matrix_of
+from particlesim.core.constants import MAX_MANIFOLD
+from particlesim.core.math3d import matrix_of
+from particlesim.dynamics.contact.contact_points import COLUMNS, LEVER_I, handed_down
+from particlesim.geometry.narrow_phase.contact_manifold import hull_patch
+from particlesim.geometry.shape_table import stack_shapes
+from particlesim.simulation.simulation import Simulation
 from tests.worlds import listed, scene
 
 GRAVITY = (0.0, 0.0, -9.81)

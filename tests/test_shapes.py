@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 import particlesim as ps
 from particlesim import shapes
-from particlesim.constants import HULL, SPHERE
-from particlesim.mass_properties import mass_properties, principal_axes
-from particlesim.state import stack_shapes
+from particlesim.core.constants import HULL, SPHERE
+from particlesim.geometry.mass_properties import mass_properties, principal_axes
+from particlesim.geometry.shape_table import stack_shapes
 from tests import oracles
 
 

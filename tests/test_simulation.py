@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from particlesim.constants import STEP_FRACTION
-from particlesim.simulation import Simulation, SimulationError
+from particlesim.core.constants import STEP_FRACTION
+from particlesim.simulation.simulation import Simulation, SimulationError
 from tests.worlds import gas, listed, scene
 
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from particlesim.simulation import Simulation
-from particlesim.trajectory import Trajectory, TrajectoryError, TrajectoryWriter
+from particlesim.simulation.simulation import Simulation
+from particlesim.trajectory.gsd_file import Trajectory, TrajectoryError, TrajectoryWriter
 from tests.worlds import gas, scene
 
 

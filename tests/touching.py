@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from particlesim.constants import MAX_MANIFOLD
-from particlesim.narrow_phase.contacts import contact_now
-from particlesim.simulation import Simulation
+from particlesim.core.constants import MAX_MANIFOLD
+from particlesim.model.touching import contact_now
+from particlesim.simulation.simulation import Simulation
 from tests.worlds import listed, scene
 
 

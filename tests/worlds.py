@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from particlesim.scene import Scene
-from particlesim.scene.change import scaled
 from particlesim.scene.file import load_scene
+from particlesim.scene.overrides import scaled
 
 # A scene of more particles than this is tested by a twin with as many.
 MOST = 4000

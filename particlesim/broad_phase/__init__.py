@@ -27,9 +27,9 @@ from typing import Any
 import numpy as np
 
 from particlesim.broad_phase.grid import grid_pairs
-from particlesim.broad_phase.leaves import octree_leaves
 from particlesim.broad_phase.naive import naive_pairs
 from particlesim.broad_phase.octree import octree_pairs
+from particlesim.broad_phase.octree_cells import octree_leaves
 
 __all__ = ["METHODS", "find_pairs", "octree_leaves"]
 

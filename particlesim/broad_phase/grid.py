@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from particlesim.broad_phase.canonical import canonical
-from particlesim.broad_phase.counting import counting_sort
-from particlesim.broad_phase.layout import Layout, buckets_of_box, fill_keys, lay_out
-from particlesim.broad_phase.pairs import BATCH, any_wraps, append_overlaps, collect, row_of
-from particlesim.broad_phase.survey import survey
-from particlesim.crew import Crew
-from particlesim.jit import kernel
+from particlesim.broad_phase.aabb_statistics import survey
+from particlesim.broad_phase.aabb_test import BATCH, any_wraps, append_overlaps, collect, row_of
+from particlesim.broad_phase.counting_sort import counting_sort
+from particlesim.broad_phase.grid_layout import Layout, buckets_of_box, fill_keys, lay_out
+from particlesim.broad_phase.pair_sort import canonical
+from particlesim.core.jit import kernel
+from particlesim.core.parallel import Crew
 
 # Ranges of candidates that are listed before they are tested, or as many as one box has: 192 kB.
 _RANGES = 16384

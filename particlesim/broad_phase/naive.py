@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from particlesim.broad_phase.canonical import canonical
-from particlesim.broad_phase.columns import LANES, column_of, lowest, overlap_bits
-from particlesim.broad_phase.pairs import BATCH, any_wraps, append_overlaps, collect
-from particlesim.crew import Crew
-from particlesim.jit import kernel
+from particlesim.broad_phase.aabb_test import BATCH, any_wraps, append_overlaps, collect
+from particlesim.broad_phase.pair_sort import canonical
+from particlesim.broad_phase.soa_aabb import LANES, column_of, lowest, overlap_bits
+from particlesim.core.jit import kernel
+from particlesim.core.parallel import Crew
 
 # Boxes that are tested against a whole range before the next is taken: 24 kB, which stay in the fastest cache.
 TILE = 1024

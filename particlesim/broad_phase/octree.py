@@ -12,14 +12,14 @@ import itertools
 
 import numpy as np
 
-from particlesim.broad_phase.canonical import canonical
-from particlesim.broad_phase.codes import LEVELS, codes_of
-from particlesim.broad_phase.columns import LANES, child_bits, column_of, lowest, may_overlap, overlap_bits
-from particlesim.broad_phase.pairs import BATCH, any_wraps, append_overlaps, collect
-from particlesim.broad_phase.survey import Survey, survey
-from particlesim.broad_phase.tree import CHILD, CHILDREN, START, STOP, build, fit, in_order, sort_by_code
-from particlesim.crew import Crew
-from particlesim.jit import kernel
+from particlesim.broad_phase.aabb_statistics import Survey, survey
+from particlesim.broad_phase.aabb_test import BATCH, any_wraps, append_overlaps, collect
+from particlesim.broad_phase.morton import LEVELS, codes_of
+from particlesim.broad_phase.octree_build import CHILD, CHILDREN, START, STOP, build, fit, in_order, sort_by_code
+from particlesim.broad_phase.pair_sort import canonical
+from particlesim.broad_phase.soa_aabb import LANES, child_bits, column_of, lowest, may_overlap, overlap_bits
+from particlesim.core.jit import kernel
+from particlesim.core.parallel import Crew
 
 # Boxes near a leaf that are listed before all boxes of the leaf are tested against them: 24 kB of columns.
 _LIST = 1024

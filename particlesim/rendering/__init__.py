@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 from particlesim.rendering.errors import RenderError
-from particlesim.rendering.movie import write_image, write_movie
-from particlesim.rendering.platform import describe, describe_ffmpeg
+from particlesim.rendering.gl.platform import describe, describe_ffmpeg
+from particlesim.rendering.video.encoder import write_image, write_movie
 
 if TYPE_CHECKING:
     from particlesim.rendering.renderer import Renderer

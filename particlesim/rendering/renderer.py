@@ -8,25 +8,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.rendering import geometry, platform
-from particlesim.rendering.bodies import bodies_of
 from particlesim.rendering.camera import Box, View, subject_box, view_at
-from particlesim.rendering.cast import Cast, cast_of
-from particlesim.rendering.cells import cell_lines
-from particlesim.rendering.colour import ParticleColours
-from particlesim.rendering.ground import Ground
-from particlesim.rendering.groups import Groups, grouped
-from particlesim.rendering.lighting import key_light
-from particlesim.rendering.outlook import Outlook
-from particlesim.rendering.overlay import Overlay
+from particlesim.rendering.gl import geometry, platform
+from particlesim.rendering.hud.overlay import Overlay
+from particlesim.rendering.octree_cells import cell_lines
 from particlesim.rendering.quality import PRESETS
-from particlesim.rendering.sky import Sky
-from particlesim.rendering.smoothing import smooth_edges
-from particlesim.rendering.surfaces import TILE, surfaces_of, table_of
-from particlesim.rendering.surroundings import Surroundings
-from particlesim.rendering.visibility import Sight, look
+from particlesim.rendering.shading.ambient_occlusion import Sky
+from particlesim.rendering.shading.colour import ParticleColours
+from particlesim.rendering.shading.environment import Surroundings
+from particlesim.rendering.shading.floor import Ground
+from particlesim.rendering.shading.fxaa import smooth_edges
+from particlesim.rendering.shading.lighting import key_light
+from particlesim.rendering.shading.surfaces import TILE, surfaces_of, table_of
+from particlesim.rendering.visibility.geometry_tables import bodies_of
+from particlesim.rendering.visibility.instances import Cast, cast_of
+from particlesim.rendering.visibility.occlusion_clusters import Groups, grouped
+from particlesim.rendering.visibility.projection import Outlook
+from particlesim.rendering.visibility.rasterise import Sight, look
 from particlesim.scene import Scene
-from particlesim.trajectory import Frame, Header
+from particlesim.trajectory.gsd_file import Frame, Header
 
 # Widths of lines [pixels] in a picture 720 pixels high: the edges of the world, and those of the octree's cells.
 _BOX_LINE = 1.3

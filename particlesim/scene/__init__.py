@@ -11,9 +11,9 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from particlesim.scene.base import MAX_COUNT, Model, PlainFloat, Text, whole
+from particlesim.scene.camera import Camera, FixedCamera, Movie, Show
 from particlesim.scene.groups import Group
-from particlesim.scene.picture import Camera, FixedCamera, Movie, Show
-from particlesim.scene.wording import must_be
+from particlesim.scene.messages import must_be
 from particlesim.scene.world import Solver, World
 
 

@@ -9,7 +9,7 @@ from PIL import ImageColor
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
-from particlesim.scene.wording import OUT_OF_REACH, hint, must_be
+from particlesim.scene.messages import OUT_OF_REACH, hint, must_be
 
 # The sizes that numbers of a scene may have, other than 0: the fifth powers and the products that inertias, momenta
 # and energies are made of stay well inside double precision.

@@ -10,8 +10,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from particlesim.scene import Scene
-from particlesim.scene.explain import explain
-from particlesim.scene.wording import shown
+from particlesim.scene.messages import shown
+from particlesim.scene.validation_errors import explain
 
 
 class SceneError(ValueError):

@@ -34,7 +34,7 @@ from particlesim.scene.base import (
     shorthand,
     whole,
 )
-from particlesim.scene.wording import hint, listed, must_be, one_of
+from particlesim.scene.messages import hint, listed, must_be, one_of
 
 
 class PlainShape(Model):

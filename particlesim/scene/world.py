@@ -15,7 +15,7 @@ from particlesim.scene.base import (
     shorthand,
     whole,
 )
-from particlesim.scene.wording import hint, listed, must_be
+from particlesim.scene.messages import hint, listed, must_be
 
 Boundary = Literal["wall", "periodic", "open"]
 _BOUNDARIES = "wall", "periodic", "open"

@@ -1,0 +1,93 @@
+"""The comparison as a figure, drawn without a screen: SVG and PNG."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from particlesim.benchmarks.broad_phase.measure import machine_words
+from particlesim.benchmarks.broad_phase.runs import SceneComparison
+from particlesim.benchmarks.broad_phase.sweep import Sweep
+from particlesim.core.atomic_write import appearing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Colours that people who confuse red and green can tell apart: M. Okabe, K. Ito, "Color Universal Design", 2008.
+_COLOURS = {"naive": "#D55E00", "grid": "#0072B2", "octree": "#009E73"}
+_OTHERS = ("#7F7F7F", "#B0B0B0")
+_NAMES = {"grid": "boxing (grid)"}
+
+
+def draw_sweep(sweep: Sweep, path: Path) -> list[Path]:
+    """Seconds and tests over the number of boxes, both axes logarithmic; ``path`` without its ending."""
+    figure = _figure(10.0, 4.4)
+    left, right = figure.subplots(1, 2)
+    for axes, value, label in ((left, "seconds", "seconds for one search"), (right, "tested", "pairs of boxes tested")):
+        others = iter(_OTHERS)
+        for method in sweep.methods:
+            counts, measured = sweep.of(method, value)
+            if len(counts):
+                _curve(
+                    axes, counts, measured, sweep, method, value, next(others, "k") if method not in _COLOURS else ""
+                )
+        axes.set(xscale="log", yscale="log", xlabel="boxes n", ylabel=label)
+        axes.grid(True, which="major", color="#E6E6E6")
+    counts = np.array(sorted({row["boxes"] for row in sweep.rows}), dtype=float)
+    right.plot(counts, counts * (counts - 1.0), color="k", lw=0.8, ls=":", label="n (n - 1), as the paper counts naive")
+    for axes in (left, right):
+        axes.legend(frameon=False, fontsize=8)
+    figure.suptitle(f"{sweep.kind} boxes, {machine_words(sweep.machine)}", fontsize=11)
+    return _save(figure, path)
+
+
+def draw_scene(comparison: SceneComparison, path: Path) -> list[Path]:
+    """Bars: seconds of a search, tests, memory of each broad phase that ran; ``path`` without its ending."""
+    figure = _figure(9.0, 3.0)
+    panels = (
+        ("search_seconds", "seconds for one search"),
+        ("tested", "tested, all frames"),
+        ("memory", "bytes of memory"),
+    )
+    names = [result.method for result in comparison.ran]
+    for axes, (value, label) in zip(figure.subplots(1, len(panels)), panels, strict=True):
+        heights = [getattr(result, value) for result in comparison.ran]
+        axes.bar(names, heights, color=[_COLOURS[name] for name in names], width=0.6)
+        axes.set(yscale="log", title=label)
+        axes.title.set_size(9)
+    about = f"{comparison.name}: {comparison.boxes:,} boxes, {comparison.frames} frames"
+    figure.suptitle(f"{about}, {machine_words(comparison.machine)}", fontsize=10)
+    return _save(figure, path)
+
+
+def _curve(
+    axes: Any, counts: np.ndarray, measured: np.ndarray, sweep: Sweep, method: str, value: str, other: str
+) -> None:
+    exponent = sweep.exponent(method, value)
+    fitted = "" if exponent is None else f", n^{exponent:.2f}"
+    style = {"color": other, "lw": 1.0, "ls": "--"} if other else {"color": _COLOURS[method], "lw": 1.8}
+    axes.plot(counts, measured, marker="o", ms=3.0, label=f"{_NAMES.get(method, method)}{fitted}", **style)
+
+
+def _figure(width: float, height: float) -> Figure:
+    """An empty figure of this size [inch], apart from any window."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  (slow to import)
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def _save(figure: Figure, path: Path) -> list[Path]:
+    """Write SVG, with text as text and nothing of this moment in it, and PNG; each appears whole or not at all."""
+    from matplotlib import rc_context  # noqa: PLC0415
+
+    written = []
+    for suffix, metadata in ((".svg", {"Date": None}), (".png", {})):
+        with (
+            rc_context({"svg.fonttype": "none", "svg.hashsalt": "particlesim"}),
+            appearing(path.with_suffix(suffix)) as hidden,
+        ):
+            figure.savefig(hidden, dpi=110, metadata=metadata)
+        written.append(path.with_suffix(suffix))
+    return written

@@ -1,0 +1,180 @@
+"""The commands. What they need is imported when they run: ``--help`` answers at once."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from particlesim.cli.bench import measure_drawing, measure_steps
+from particlesim.cli.errors import fail, one_line_errors
+from particlesim.cli.options import MaxDrift, Quiet, SceneArgument, Threads
+from particlesim.cli.output import check_output, place_for
+from particlesim.cli.render import render
+from particlesim.cli.run import load, make_file
+from particlesim.cli.tables import print_report, print_table
+
+app = typer.Typer(
+    name="particlesim",
+    help="From a scene file to a movie of particles that bounce as physics says they do, without a screen.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # help in plain text: rich takes longer to import than all the rest
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        import importlib.metadata  # noqa: PLC0415
+
+        print(f"particlesim {importlib.metadata.version('particlesim')}")
+        raise typer.Exit
+
+
+Version = Annotated[
+    bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+]
+
+
+def main() -> None:
+    """Run the command line.
+
+    Exit code 2 for wrong input, 1 for what this machine cannot do, 3 for a drift of energy that was not allowed,
+    130 for Ctrl-C.
+    """
+    app()
+
+
+@app.callback()
+def _options(version: Version = False) -> None:
+    """Options of the program itself; its help text is that of ``app``."""
+
+
+app.command(short_help="Make a movie of a scene or of a trajectory.")(render)
+
+
+@app.command(short_help="Simulate a scene and write its trajectory.")
+def simulate(
+    scene: SceneArgument,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The trajectory.  [default: renders/NAME.gsd]")
+    ] = None,
+    quiet: Quiet = False,
+    threads: Threads = None,
+    max_drift: MaxDrift = None,
+) -> None:
+    """Simulate a scene and write its trajectory (GSD): no OpenGL, no movie."""
+    with one_line_errors(scene):
+        loaded = load(scene)
+        from particlesim.jobs.movie import simulate as write_trajectory  # noqa: PLC0415
+
+        with place_for(output, scene, ".gsd") as path:
+            make_file(write_trajectory, loaded, path, quiet, threads, max_drift)
+
+
+@app.command(short_help="Validate a scene and say what it amounts to.")
+def check(scene: SceneArgument) -> None:
+    """Validate a scene and say what it amounts to, without simulating it."""
+    with one_line_errors(scene):
+        loaded = load(scene)
+        from particlesim.simulation.estimate import survey  # noqa: PLC0415
+
+        print_table(scene.name, survey(loaded))
+
+
+@app.command(short_help="Compare the broad phases on a scene, on a sweep or on a stream of boxes.")
+def compare(
+    source: Annotated[
+        Path | None, typer.Argument(metavar="[SCENE|STREAM]", help="A scene file, or an .aabb stream (Broadmark).")
+    ] = None,
+    sweep: Annotated[
+        str | None, typer.Option("--sweep", help="Instead: uniform, clustered or mixed boxes, 100 to a million.")
+    ] = None,
+    steps: Annotated[int | None, typer.Option("--steps", min=1, help="Time steps of a scene.  [default: 3 s]")] = None,
+    largest: Annotated[int, typer.Option("--largest", min=100, help="Boxes a sweep ends with.")] = 1_000_000,
+    limit: Annotated[float, typer.Option("--limit", min=0.0, help="Seconds after which a method is left out.")] = 10.0,
+    stream: Annotated[
+        Path | None, typer.Option("--stream", help="Also write the scene's frames as a stream (.aabb).")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="JSON, and SVG and PNG beside it.  [default: renders/]")
+    ] = None,
+    quiet: Quiet = False,
+    threads: Threads = None,
+) -> None:
+    """Run every broad phase on the same boxes: seconds, tests, memory, and proof that all give the same.
+
+    Exit code 1 if they do not.
+    """
+    if (source is None) == (sweep is None):
+        fail("give a scene, a stream or --sweep, and one of them only", 2)
+    if stream is not None:
+        check_output(stream, ".aabb")
+    with one_line_errors(source or Path("compare")):
+        from particlesim.benchmarks.broad_phase.command import on_scene, on_stream, on_sweep  # noqa: PLC0415
+        from particlesim.cli.progress import shown_progress  # noqa: PLC0415
+
+        is_stream = source is not None and source.suffix.lower() == ".aabb"
+        scene = load(source) if source is not None and not is_stream else None
+        with place_for(output, Path(f"compare_{source.stem if source else sweep}"), ".json") as path:
+            with shown_progress(quiet, "particle" if sweep else "step") as progress:
+                settings: dict[str, Any] = {"limit": limit, "threads": threads, "progress": progress}
+                if scene is not None and source is not None:
+                    report = on_scene(scene, source.stem, path, stream, steps=steps, **settings)
+                elif source is not None:
+                    report = on_stream(source, path, **settings)
+                else:
+                    report = on_sweep(str(sweep), path, largest=largest, **settings)
+            if not quiet:
+                print_report(report)
+    if not report.same:
+        fail("the broad phases do not agree", 1)
+
+
+@app.command(short_help="Measure how fast this machine simulates, or draws.")
+def bench(
+    large: Annotated[bool, typer.Option("--large", help="Measure a million particles as well.")] = False,
+    drawing: Annotated[bool, typer.Option("--drawing", help="Measure the drawing of pictures instead.")] = False,
+    figures: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write the figures to a file as well.")
+    ] = None,
+    quiet: Quiet = False,
+    threads: Threads = None,
+) -> None:
+    """Measure how many whole time steps a second gases of spheres and of mixed shapes make on this machine.
+
+    They are in a periodic box at unit temperature. In a step a particle moves a twentieth of its radius on average.
+
+    With --drawing, measure how long a picture of 1280x720 pixels takes, beside VTK where it is installed.
+    """
+    with one_line_errors(Path("bench")):
+        if figures is not None:
+            check_output(figures, ".json")
+        if drawing:
+            measure_drawing(large, figures, quiet)
+        else:
+            measure_steps(large, figures, quiet, threads)
+
+
+@app.command(short_help="Say what this machine has and what is missing.")
+def doctor() -> None:
+    """Say what this machine has for simulating and drawing, and how to get what is missing."""
+    from particlesim.cli.doctor import diagnose  # noqa: PLC0415
+
+    findings = diagnose()
+    print_table("particlesim", [(f.what, f.text if f.good else "missing, see below") for f in findings])
+    missing = [f"{finding.what}: {finding.text}" for finding in findings if not finding.good]
+    if missing:
+        # Below the table and on a line of its own, so that a command can be copied whole.
+        fail("\n".join(missing), 1)
+
+
+@app.command(short_help="Print the JSON Schema of scene files.")
+def schema() -> None:
+    """Print the JSON Schema of scene files, for editors that complete and check TOML."""
+    from particlesim.scene import Scene  # noqa: PLC0415
+
+    print(json.dumps(Scene.model_json_schema(), indent=2))

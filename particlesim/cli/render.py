@@ -1,0 +1,93 @@
+"""The command ``render``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from particlesim.cli.errors import one_line_errors
+from particlesim.cli.options import MaxDrift, Quiet, Threads
+from particlesim.cli.output import place_for
+from particlesim.cli.render_options import Wishes, wished_frames, wished_scene, wished_time
+from particlesim.cli.run import load, make_file
+
+if TYPE_CHECKING:
+    from particlesim.scene import Scene
+    from particlesim.trajectory.gsd_file import Trajectory
+
+
+def render(
+    source: Annotated[Path, typer.Argument(metavar="SCENE|TRAJECTORY", help="A scene file or a .gsd trajectory.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The movie, or the picture.  [default: renders/NAME.mp4]")
+    ] = None,
+    frames: Annotated[
+        str | None, typer.Option("--frames", metavar="A:B", help="Draw frames A to B - 1 only; either may be left out.")
+    ] = None,
+    every: Annotated[
+        str | None, typer.Option("--every", metavar="N", help="Draw each Nth frame only: the movie is N times as fast.")
+    ] = None,
+    still: Annotated[
+        str | None, typer.Option("--still", metavar="T", help="Make one picture (PNG), of the time T in seconds.")
+    ] = None,
+    look: Annotated[
+        Path | None,
+        typer.Option("--look", metavar="SCENE", help="Take camera, movie, show and colours from another scene file."),
+    ] = None,
+    quality: Annotated[
+        str | None,
+        typer.Option("--quality", metavar="WORD", help="draft (640x360), normal (1280x720), high (1920x1080)."),
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option("--size", metavar="WIDTHxHEIGHT", help="Size of the pictures in pixels.")
+    ] = None,
+    camera: Annotated[
+        str | None, typer.Option("--camera", metavar="KIND|TABLE", help="fixed, orbit or '{kind = \"look-at\", ...}'.")
+    ] = None,
+    colour: Annotated[
+        str | None, typer.Option("--colour", metavar="COLOUR", help="Of all particles: by_speed, by_shape, a name ...")
+    ] = None,
+    scale: Annotated[
+        str | None,
+        typer.Option("--scale", metavar="S", help="Simulate S times as many particles, sized to fill as much."),
+    ] = None,
+    quiet: Quiet = False,
+    threads: Threads = None,
+    max_drift: MaxDrift = None,
+) -> None:
+    """Simulate a scene, or read a trajectory, and make a movie of it, with a poster (PNG) beside it."""
+    wishes = Wishes(frames, every, still, look, quality, size, camera, colour, scale)
+    with one_line_errors(source), _opened(source, wishes) as movable:
+        subject, scene, total = movable
+        time = wished_time(scene.duration, wishes)
+        chosen = None if time is not None else wished_frames(total, wishes)
+        from particlesim.jobs import movie  # noqa: PLC0415
+
+        if time is None:
+            make, suffix = partial(movie.render, look=scene, frames=chosen), ".mp4"
+        else:
+            make, suffix = partial(movie.still, look=scene, time=time), ".png"
+        with place_for(output, source, suffix) as path:
+            make_file(make, subject, path, quiet, threads, max_drift)
+
+
+@contextmanager
+def _opened(source: Path, wishes: Wishes) -> Iterator[tuple[Scene | Trajectory, Scene, int]]:
+    """What to make a movie of, the scene as it is to be drawn, and how many frames there are.
+
+    SceneError or TrajectoryError if the source cannot be read, OptionError for a value that is not allowed.
+    """
+    if source.suffix.lower() != ".gsd":
+        scene = wished_scene(load(source), wishes, of_trajectory=False)
+        yield scene, scene, scene.frames
+        return
+    from particlesim.jobs.frame_source import scene_of  # noqa: PLC0415
+    from particlesim.trajectory.gsd_file import Trajectory  # noqa: PLC0415
+
+    with Trajectory(source) as trajectory:
+        yield trajectory, wished_scene(scene_of(trajectory), wishes, of_trajectory=True), len(trajectory)

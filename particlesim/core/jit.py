@@ -1,0 +1,142 @@
+"""The one decorator under which every kernel is compiled, and the cache in which the result is kept.
+
+Numba's on-disk cache notices a change in the file of a kernel but not in the files of the kernels that it calls.
+The cache folder is therefore named after a digest of all kernel sources: a stale kernel cannot be run, and a
+package installed read-only still has a cache.
+"""
+
+from __future__ import annotations
+
+import getpass
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import cgutils, types
+from numba.core.imputils import impl_ret_untracked
+from numba.extending import intrinsic, models, register_model
+from numba.np.arrayobj import make_array
+
+_PACKAGE = Path(__file__).parent.parent
+
+
+def _source_digest() -> str:
+    digest = hashlib.sha256()
+    for path in sorted(_PACKAGE.rglob("*.py")):
+        source = path.read_bytes()
+        if b"@kernel" in source or path.name in ("constants.py", "jit.py"):
+            digest.update(source)
+    return digest.hexdigest()[:16]
+
+
+def _cache_folder() -> str:
+    """The folder for compiled kernels: NUMBA_CACHE_DIR if set, else the user's cache, else a temporary folder."""
+    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    folder = Path(base) / "particlesim" / f"kernels-{_source_digest()}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError:
+        folder = Path(tempfile.gettempdir()) / f"particlesim-{getpass.getuser()}-{folder.name}"
+        folder.mkdir(parents=True, exist_ok=True)
+    return str(folder)
+
+
+CACHE_FOLDER = _cache_folder()
+
+
+def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False) -> Any:
+    """Compile ``function`` for the machine: cached on disk, without the GIL, IEEE arithmetic (no fastmath).
+
+    ``inline=True`` writes it into its callers.  It is for what runs once an item and takes the structs of arrays:
+    handing these over counts references to some thirty arrays, which takes longer than moving a particle.
+    """
+    if function is None:
+        return lambda wrapped: kernel(wrapped, inline=inline)
+    # The place of a function's cache is settled when it is decorated; other users of numba keep theirs.
+    config: Any = numba.config
+    elsewhere = config.CACHE_DIR
+    config.CACHE_DIR = CACHE_FOLDER
+    try:
+        options: dict[str, Any] = {"inline": "always" if inline else "never", "error_model": "numpy"}
+        return numba.njit(cache=True, nogil=True, **options)(function)
+    finally:
+        config.CACHE_DIR = elsewhere
+
+
+class _Uncounted(types.Array):
+    """The type of an array that somebody else holds: references to it, or to parts of it, are not counted."""
+
+    def __init__(self, array: types.Array) -> None:
+        name = f"uncounted {array.name}"
+        super().__init__(array.dtype, array.ndim, array.layout, not array.mutable, name, array.aligned)
+
+    def copy(self, dtype: Any = None, ndim: Any = None, layout: Any = None, readonly: Any = None) -> Any:
+        """The type of a part, which numba asks for with the number of its axes, or of a new array like this one."""
+        kind: Any = super().copy(dtype, ndim, layout, readonly)
+        return kind if ndim is None else _Uncounted(kind)
+
+
+@register_model(_Uncounted)
+class _UncountedModel(models.StructModel):
+    """An array as numba lays it out, but that what counts its references is a mere address."""
+
+    def __init__(self, manager: Any, kind: Any) -> None:
+        counted = models.ArrayModel(manager, kind)
+        members = dict(zip(counted._fields, counted._members, strict=True))  # the way numba's own code reads it
+        members["meminfo"] = types.voidptr
+        super().__init__(manager, kind, list(members.items()))
+
+
+def _uncounted_type(kind: Any) -> Any:
+    """The type of an array, or of a tuple with arrays in it, that is not counted."""
+    if isinstance(kind, types.Array):
+        return _Uncounted(kind)
+    if isinstance(kind, types.BaseTuple):
+        elements: Any = kind
+        elements = [_uncounted_type(element) for element in elements]
+        return types.BaseTuple.from_types(elements, getattr(kind, "instance_class", None))
+    return kind
+
+
+def _uncounted(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    """The value, of type ``kind``, as its uncounted type has it."""
+    if isinstance(kind, types.Array):
+        array, bare = make_array(kind)(context, builder, value=value), make_array(_Uncounted(kind))(context, builder)
+        for name in ("nitems", "itemsize", "data", "shape", "strides"):
+            setattr(bare, name, getattr(array, name))
+        bare.meminfo = cgutils.get_null_value(array.meminfo.type)
+        bare.parent = cgutils.get_null_value(array.parent.type)
+        return bare._getvalue()
+    if isinstance(kind, types.BaseTuple):
+        kinds: Any = kind
+        elements = [_uncounted(context, builder, k, builder.extract_value(value, i)) for i, k in enumerate(kinds)]
+        return context.make_tuple(builder, _uncounted_type(kind), elements)
+    return value
+
+
+def _borrow(typing_context: Any, thing: Any) -> Any:
+    result = _uncounted_type(thing)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return impl_ret_untracked(context, builder, result, _uncounted(context, builder, thing, arguments[0]))
+
+    return result(thing), generate
+
+
+def _same(thing: Any) -> Any:
+    return thing
+
+
+_config: Any = numba.config
+
+# Inside a kernel: an array or tuple (of tuples) of arrays that came as an argument, whose references are not counted
+# from here on. Counting is atomic: handing a struct of arrays to a function takes longer than moving a particle, and
+# threads that count the same arrays wait for each other. The caller of the kernel holds the arrays meanwhile; neither
+# they nor parts of them may be returned.
+borrowed: Any = _same if _config.DISABLE_JIT else intrinsic(_borrow)

@@ -1,0 +1,1 @@
+"""Continuous collision detection: when two bodies first touch along their paths."""

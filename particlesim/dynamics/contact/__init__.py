@@ -1,0 +1,1 @@
+"""What becomes of contacts: impulses at impacts, and what rests."""

@@ -1,0 +1,1 @@
+"""Shapes and the exact answers about them: mass properties, boxes, separation, contact manifolds."""

@@ -1,0 +1,1 @@
+"""The exact tests of two shapes, a pair of kinds a file."""

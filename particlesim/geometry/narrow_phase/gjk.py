@@ -1,0 +1,208 @@
+"""Distance between two convex hulls: the algorithm of Gilbert, Johnson and Keerthi.
+
+E. G. Gilbert, D. W. Johnson, S. S. Keerthi, IEEE Journal of Robotics and Automation 4 (1988) 193-203. It walks a
+simplex of up to four corners of the difference body B - A towards the origin. The nearest point of the simplex is
+the best over all of its parts that hold the newest corner: a few more flops than Johnson's recursion, and no answer
+that lies outside the simplex, however thin it is. The vector to that point is made perpendicular to its part by
+construction, not by subtraction of nearly equal points: hulls that all but touch keep their distance and normal.
+"""
+
+import math
+
+from particlesim.core.jit import kernel
+from particlesim.core.math3d import add, along, apply, apply_transposed, cross, dot, norm, row, scaled, sub
+
+# The search ends when a corner of the difference body can be nearer than the simplex by no more than this fraction.
+_GAP = 1e-15
+
+# Every step shortens the distance or turns the direction.  Hulls of MAX_MESH_VERTICES take some 30 steps at the most.
+_MAX_STEPS = 256
+
+# Steps that only turn the direction, the distance being shortened by less than rounding: more go round in circles.
+_MAX_IDLE = 8
+
+# How uncertain a distance is by its own length, as a fraction: some units in the last place.
+_ROUNDING = 1e-14
+
+_ORIGIN = (0.0, 0.0, 0.0)
+
+# Corners of no simplex: how many, and the vertices of either hull that they are differences of.
+NO_CORNERS = (0, (-1, -1, -1, -1), (-1, -1, -1, -1))
+
+
+@kernel
+def _support(vertices, matrix, direction):
+    """The number of the vertex of a hull farthest along ``direction``; vertices (v, 3) in body axes."""
+    local = apply_transposed(matrix, direction)
+    best = 0
+    farthest = -math.inf
+    for v in range(len(vertices)):
+        reach = dot(row(vertices, v), local)
+        if reach > farthest:
+            farthest = reach
+            best = v
+    return best
+
+
+@kernel
+def _vertex(vertices, size, matrix, v):
+    """Vertex ``v`` of a hull relative to its centroid, in world axes."""
+    return apply(matrix, scaled(row(vertices, v), size))
+
+
+@kernel
+def _nearest_on_segment(p, a):
+    """Weight of a, and the nearest point to the origin of the line pa; the weight is negative if there is none."""
+    e = sub(a, p)
+    length2 = dot(e, e)
+    if length2 <= 0.0:
+        return -1.0, _ORIGIN
+    return -dot(p, e) / length2, scaled(cross(e, cross(p, e)), 1.0 / length2)
+
+
+@kernel
+def _nearest_on_triangle(p, a, b):
+    """Weights of a and b, and the nearest point to the origin of the plane pab; negative weights if there is none."""
+    e, f = sub(a, p), sub(b, p)
+    n = cross(e, f)
+    area2 = dot(n, n)
+    if area2 <= 0.0:
+        return -1.0, -1.0, _ORIGIN
+    # The normal of a sliver is uncertain across it, where it is narrow: only that part of p may meet the error.
+    longer = e if dot(e, e) > dot(f, f) else f
+    across = along(p, longer, -dot(p, longer) / dot(longer, longer))
+    return dot(cross(f, p), n) / area2, dot(cross(p, e), n) / area2, scaled(n, dot(across, n) / area2)
+
+
+@kernel
+def _weigh_tetrahedron(p, a, b, c):
+    """Weights of a, b and c that make the origin of a tetrahedron's corners; negative if it is flat."""
+    e, f, g = sub(a, p), sub(b, p), sub(c, p)
+    volume = dot(e, cross(f, g))
+    if volume == 0.0:
+        return -1.0, -1.0, -1.0
+    return -dot(p, cross(f, g)) / volume, -dot(p, cross(g, e)) / volume, -dot(p, cross(e, f)) / volume
+
+
+@kernel
+def _nearest_of_simplex(simplex, newest):
+    """The nearest point to the origin of the parts of a simplex that hold corner ``newest``, its last.
+
+    Returns (squared distance, nearest point, number of corners of its part, which corners, their weights).
+    """
+    p = simplex[newest]
+    best, nearest, count, part, weights = dot(p, p), p, 1, (newest, 0, 0, 0), (1.0, 0.0, 0.0, 0.0)
+    for i in range(newest):
+        t, v = _nearest_on_segment(p, simplex[i])
+        if 0.0 <= t <= 1.0 and dot(v, v) < best:
+            best, nearest, count = dot(v, v), v, 2
+            part, weights = (newest, i, 0, 0), (1.0 - t, t, 0.0, 0.0)
+        for j in range(i + 1, newest):
+            t, u, v = _nearest_on_triangle(p, simplex[i], simplex[j])
+            if t >= 0.0 and u >= 0.0 and t + u <= 1.0 and dot(v, v) < best:
+                best, nearest, count = dot(v, v), v, 3
+                part, weights = (newest, i, j, 0), (1.0 - t - u, t, u, 0.0)
+    if newest == 3:
+        t, u, s = _weigh_tetrahedron(p, simplex[0], simplex[1], simplex[2])
+        if t >= 0.0 and u >= 0.0 and s >= 0.0 and t + u + s <= 1.0:
+            best, nearest, count = 0.0, _ORIGIN, 4
+            part, weights = (newest, 0, 1, 2), (1.0 - t - u - s, t, u, s)
+    return best, nearest, count, part, weights
+
+
+@kernel
+def _chosen(four, part):
+    """Four things in the order of the numbers in ``part``."""
+    return four[part[0]], four[part[1]], four[part[2]], four[part[3]]
+
+
+@kernel
+def _replaced(four, k, new):
+    """Four things of which number ``k`` is new."""
+    return (
+        new if k == 0 else four[0],
+        new if k == 1 else four[1],
+        new if k == 2 else four[2],
+        new if k == 3 else four[3],
+    )
+
+
+@kernel
+def _holds(picks_a, picks_b, count, a, b):
+    """Whether the first ``count`` corners hold the difference of vertices a and b."""
+    found = False
+    for k in range(count):
+        found = found or (picks_a[k] == a and picks_b[k] == b)
+    return found
+
+
+@kernel
+def _weighted(vertices, size, matrix, picks, weights, count):
+    """The point that ``weights`` make of ``count`` vertices of a hull, relative to its centroid."""
+    point = _ORIGIN
+    for k in range(count):
+        point = along(point, _vertex(vertices, size, matrix, picks[k]), weights[k])
+    return point
+
+
+@kernel
+def hulls_apart(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching):
+    """Whether hull b, centred at ``offset`` from hull a, is farther from it than ``touching`` [m]."""
+    length, _, _, _, _ = hull_distance(
+        vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching, True, NO_CORNERS
+    )
+    return length > touching
+
+
+@kernel
+def hull_distance(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching, only_whether, known):
+    """Distance of hull b, centred at ``offset`` from hull a, and the nearest points relative to a's centroid.
+
+    Returns (distance, direction from a to b, point of a, point of b, corners). The direction, of any length, is the one
+    along which they are proven to be that far apart: near contact it is more certain than the difference of the points.
+    The corners are those of the last simplex. ``known`` are corners to begin with: those of the last simplex when the
+    hulls were a little elsewhere save most of the search.
+    The distance is 0 if they overlap, are nearer than ``touching`` [m], or if rounding ended the search farther than
+    that from a proof of the distance. With ``only_whether`` any number above ``touching`` may stand for the distance
+    of hulls that are apart: the first separating direction ends the search.
+    """
+    simplex = (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)
+    picks_a = picks_b = (-1, -1, -1, -1)
+    weights = (1.0, 0.0, 0.0, 0.0)
+    v = offset if norm(offset) > 0.0 else (1.0, 0.0, 0.0)
+    apart = v
+    length, at_least = math.inf, -math.inf
+    count = idle = 0
+    for step in range(_MAX_STEPS):
+        searched = step >= known[0]
+        a = _support(vertices_a, matrix_a, v) if searched else known[1][step]
+        b = _support(vertices_b, matrix_b, scaled(v, -1.0)) if searched else known[2][step]
+        w = sub(add(offset, _vertex(vertices_b, size_b, matrix_b, b)), _vertex(vertices_a, size_a, matrix_a, a))
+        if searched:
+            bound = dot(v, w) / norm(v)
+            if bound > at_least:
+                at_least, apart = bound, v
+            if only_whether and at_least > touching:
+                return at_least, v, _ORIGIN, _ORIGIN, NO_CORNERS
+            if count > 0 and length - at_least <= _GAP * length:
+                break
+            if _holds(picks_a, picks_b, count, a, b):
+                break
+        simplex = _replaced(simplex, count, w)
+        picks_a, picks_b = _replaced(picks_a, count, a), _replaced(picks_b, count, b)
+        shorter2, nearest, found, part, of_part = _nearest_of_simplex(simplex, count)
+        shorter = math.sqrt(shorter2)
+        if not searched and shorter >= length:
+            continue
+        idle += shorter >= length
+        if shorter > length + touching + _ROUNDING * length or idle > _MAX_IDLE:
+            break
+        simplex, picks_a, picks_b = _chosen(simplex, part), _chosen(picks_a, part), _chosen(picks_b, part)
+        length, v, count, weights = shorter, nearest, found, of_part
+        if length <= touching:
+            break
+    if only_whether or length <= touching or length - at_least > touching + _ROUNDING * length:
+        length = 0.0
+    point_a = _weighted(vertices_a, size_a, matrix_a, picks_a, weights, count)
+    point_b = add(offset, _weighted(vertices_b, size_b, matrix_b, picks_b, weights, count))
+    return length, apart, point_a, point_b, (count, picks_a, picks_b)

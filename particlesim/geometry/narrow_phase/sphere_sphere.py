@@ -1,0 +1,17 @@
+"""Sphere against sphere: the closed form."""
+
+from particlesim.core.jit import kernel
+from particlesim.core.math3d import norm, put, scaled
+
+
+@kernel
+def sphere_sphere(diameter_a, diameter_b, offset, points):
+    """Separation, normal from a to b and one contact point of sphere b at ``offset`` from sphere a.
+
+    Concentric spheres have no direction of their own: they take +x.
+    """
+    distance = norm(offset)
+    normal = scaled(offset, 1.0 / distance) if distance > 0.0 else (1.0, 0.0, 0.0)
+    separation = distance - 0.5 * (diameter_a + diameter_b)
+    put(points, 0, scaled(normal, 0.5 * (diameter_a + separation)))
+    return separation, normal, 1

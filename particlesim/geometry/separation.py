@@ -1,0 +1,102 @@
+"""The narrow phase: exact separation, normal and contact points of two shapes anywhere in space."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from particlesim.core.constants import MAX_MANIFOLD
+from particlesim.core.math3d import quaternion_product, unit_quaternion
+from particlesim.geometry.narrow_phase.pair import pair_contact
+from particlesim.geometry.shape_table import stack_shapes
+from particlesim.geometry.shapes import CATALOGUE, Shape
+
+
+class Pose(NamedTuple):
+    """Where a shape stands: its centroid [m], its orientation (w, x, y, z) and its size, a factor on the shape.
+
+    The orientation turns the axes in which the shape was described (those of a mesh's file, or of the vertices that
+    ``hull`` was given) into world axes, as in a scene file.
+    """
+
+    position: Any
+    orientation: Any = (1.0, 0.0, 0.0, 0.0)
+    size: float = 1.0
+
+
+class Separation(NamedTuple):
+    """How far apart two shapes are.
+
+    ``distance`` [m]: the exact distance if positive; if negative, minus the exact penetration depth, the length of
+    the shortest shift that parts them. ``normal`` (3,): unit, from the first to the second. ``points`` (k, 3) [m]:
+    where they (would) touch, half way between the surfaces; the corners of the patch where faces or edges are parallel.
+    """
+
+    distance: float
+    normal: np.ndarray
+    points: np.ndarray
+
+
+def separation(shape_a: Shape | str, pose_a: Any, shape_b: Shape | str, pose_b: Any) -> Separation:
+    """Exact signed distance of two shapes.
+
+    Shapes are names of the catalogue, with its usual parameters, or ``Shape`` objects; poses are ``Pose`` or plain
+    tuples (position, orientation, size), the last two optional. Orientations need not be normalised.
+    ValueError for an unknown shape, one that needs parameters, a pose with numbers that are not finite, a zero
+    quaternion or a size not above 0.
+    """
+    shapes = [_shape(shape_a), _shape(shape_b)]
+    (position_a, turn_a, size_a), (position_b, turn_b, size_b) = _checked(pose_a), _checked(pose_b)
+    turns = [_of_body_axes(turn, shape) for turn, shape in zip((turn_a, turn_b), shapes, strict=True)]
+    points = np.empty((MAX_MANIFOLD, 3))
+    offset = tuple((position_b - position_a).tolist())
+    table = stack_shapes(shapes)
+    distance, normal, count = pair_contact(table, 0, size_a, turns[0], 1, size_b, turns[1], offset, points)
+    return Separation(distance, np.array(normal), position_a + points[:count])
+
+
+def _shape(shape: Shape | str) -> Shape:
+    if isinstance(shape, Shape):
+        return shape
+    if shape not in CATALOGUE:
+        raise ValueError(f"unknown shape '{shape}'; the catalogue has {', '.join(CATALOGUE)}")
+    try:
+        return CATALOGUE[shape]()
+    except TypeError as error:
+        raise ValueError(f"'{shape}' needs parameters; give a Shape, as from CATALOGUE['{shape}'](...)") from error
+
+
+def _finite(values: Any, count: int, what: str) -> np.ndarray:
+    """The values as an array (count,). ValueError if they are not that many finite numbers."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.full(0, np.nan)
+    if array.shape != (count,) or not np.isfinite(array).all():
+        raise ValueError(f"{what} must be {count} finite numbers, not {values!r}")
+    return array
+
+
+def _checked(pose: Any) -> tuple[np.ndarray, np.ndarray, float]:
+    """Position, unit quaternion and size of a pose. ValueError if it has none."""
+    try:
+        position, orientation, size = Pose(*pose)
+    except TypeError as error:
+        raise ValueError(f"a pose is (position, orientation, size), the last two optional, not {pose!r}") from error
+    where = _finite(position, 3, "a position")
+    turn = _finite(orientation, 4, "an orientation")
+    factor = _finite([size], 1, "a size")[0]
+    if not turn.any():
+        raise ValueError("an orientation must not be all zero")
+    if factor <= 0.0:
+        raise ValueError(f"a size must be above 0, not {size}")
+    # First by the largest: the squares of a tiny or huge quaternion are not numbers that float64 has.
+    turn /= np.abs(turn).max()
+    return where, turn / np.linalg.norm(turn), float(factor)
+
+
+def _of_body_axes(turn: np.ndarray, shape: Shape) -> tuple[float, ...]:
+    """The orientation of a shape's body axes when ``turn`` is that of the axes it was described in."""
+    product = quaternion_product(tuple(turn.tolist()), tuple(shape.orientation.tolist()))
+    return tuple(unit_quaternion(product))

@@ -1,0 +1,132 @@
+"""What passes before the camera: the frames of a scene as it is simulated, or of a trajectory as they are read."""
+
+from __future__ import annotations
+
+import bisect
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+from particlesim.core.jit import CACHE_FOLDER
+from particlesim.scene import Scene
+from particlesim.scene.file import parse_scene
+from particlesim.simulation.simulation import Simulation
+from particlesim.trajectory.gsd_file import Frame, Header, Trajectory
+
+# Called with what is going on, how many frames are done, and how many there will be.
+Progress = Callable[[str, int, int], None]
+
+
+class Reel(NamedTuple):
+    """A scene, what stays the same about its particles, and their frames."""
+
+    scene: Scene
+    header: Header
+    first: Frame  # of the whole run: what scales and changes refer to
+    frames: Iterator[tuple[int, Frame]]  # with their numbers, all that are simulated or read
+    total: int  # how many there are of them
+    wanted: range  # numbers of those that pictures are wanted of
+    phase: str  # what takes the time until the next
+
+
+@contextmanager
+def opened(source: Scene | Trajectory | str | Path) -> Iterator[Scene | Trajectory]:
+    """A scene or a trajectory, which is opened for the block if its path is given. TrajectoryError if it is none."""
+    if not isinstance(source, str | Path):
+        yield source
+        return
+    with Trajectory(source) as trajectory:
+        yield trajectory
+
+
+def reel_of(source: Scene | Trajectory, wanted: range | None, threads: int | None, progress: Progress | None) -> Reel:
+    """All frames of a scene up to the last wanted one; of a trajectory those alone. None stands for all.
+
+    ValueError for frames that are not there.
+    """
+    if isinstance(source, Trajectory):
+        wanted = _among(wanted, len(source))
+        stored = ((k, source[k]) for k in wanted)
+        return Reel(scene_of(source), source.header, source[0], stored, len(wanted), wanted, "reading")
+    wanted = _among(wanted, source.frames)
+    simulation = start(source, threads, progress)
+    total = max(wanted) + 1
+    frames = frames_of(simulation, total)
+    return Reel(source, simulation.header, simulation.frame(), frames, total, wanted, "simulating")
+
+
+def reel_until(time: float, source: Scene | Trajectory, threads: int | None, progress: Progress | None) -> Reel:
+    """The frames of a scene up to ``time`` [s] and the particles at that very time; or a trajectory's nearest frame."""
+    if isinstance(source, Trajectory):
+        nearest = _nearest(source, time)
+        return reel_of(source, range(nearest, nearest + 1), threads, progress)
+    simulation = start(source, threads, progress)
+    before = source.frame_at(time) + 1
+
+    def frames() -> Iterator[tuple[int, Frame]]:
+        yield from frames_of(simulation, before)
+        simulation.run_until(time)
+        yield before, simulation.frame()
+
+    last = range(before, before + 1)
+    return Reel(source, simulation.header, simulation.frame(), frames(), before + 1, last, "simulating")
+
+
+def scene_of(trajectory: Trajectory) -> Scene:
+    """The scene that a trajectory is of. SceneError if this version cannot read it."""
+    return parse_scene(json.loads(trajectory.header.scene_json))
+
+
+def start(scene: Scene, threads: int | None, progress: Progress | None) -> Simulation:
+    """The simulation of a scene, its kernels compiled. SceneError if it cannot be built."""
+    if not any(Path(CACHE_FOLDER).rglob("*.nbi")):
+        tell(progress, "compiling, this once", 0, scene.frames)
+        _compile(scene)
+    tell(progress, "preparing", 0, scene.frames)
+    return Simulation(scene, threads=threads)
+
+
+def frames_of(simulation: Simulation, total: int) -> Iterator[tuple[int, Frame]]:
+    """The first frames of a scene and their numbers: at time zero and at every tick of its movie."""
+    yield 0, simulation.frame()
+    for k in range(1, total):
+        simulation.run_until(simulation.scene.time_of(k))
+        yield k, simulation.frame()
+
+
+def tell(progress: Progress | None, phase: str, done: int, total: int) -> None:
+    """Say how far the work is to whoever wants to know."""
+    if progress is not None:
+        progress(phase, done, total)
+
+
+def _compile(scene: Scene) -> None:
+    """Run two cubes into each other, so that the kernels a scene needs are compiled before its clock runs."""
+    at, towards = [0.3, 0.3, 0.3], [-1.0, -1.0, -1.0]
+    poses = [{"position": [-1.0, -1.0, -1.0]}, {"position": at, "velocity": towards}]
+    table = {
+        "world": {"size": [4.0, 4.0, 4.0]},
+        "solver": scene.solver,
+        "particles": [
+            {"shape": "cube", "placement": {"kind": "list", "poses": poses}},
+            {"shape": "sphere", "count": 1},
+        ],
+    }
+    Simulation(Scene.model_validate(table)).run(duration=0.5)
+
+
+def _among(wanted: range | None, total: int) -> range:
+    """The wanted ones of ``total`` frames. ValueError if there are none, or no such ones."""
+    if wanted is None:
+        return range(total)
+    if not wanted or min(wanted) < 0 or max(wanted) >= total:
+        raise ValueError(f"frames must be some of 0 to {total - 1}, not {wanted}")
+    return wanted
+
+
+def _nearest(trajectory: Trajectory, time: float) -> int:
+    """The frame whose time is nearest to ``time`` [s]."""
+    after = bisect.bisect_left(range(len(trajectory) - 1), time, key=trajectory.time)
+    return min(range(max(after - 1, 0), after + 1), key=lambda k: abs(trajectory.time(k) - time))

@@ -1,0 +1,92 @@
+"""What a run amounted to: the ledger over all its frames in a few numbers."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from particlesim.trajectory.gsd_file import Frame
+
+
+class Summary:
+    """Gathers frames as they pass: ``add`` each, then read the attributes.
+
+    Energies are compared with what there was at first, or with the largest kinetic energy seen if that is more.
+    ``elastic`` says that no impact may take energy.
+    """
+
+    def __init__(self, total_mass: float, gravity: Any, elastic: bool = True) -> None:
+        self._mass, self._gravity = total_mass, np.asarray(gravity, dtype=np.float64)
+        self.elastic = elastic
+        self._first: Frame | None = None
+        self._last: Frame | None = None
+        self._largest_kinetic = self._largest_change = self._largest_gain = 0.0
+        self._least = math.inf
+        self.frames = 0
+        self.drawn = 0  # how many of the frames there are pictures of
+        self.largest_overlap = 0.0
+        self.seconds: dict[str, float] = {}
+
+    def add(self, frame: Frame) -> None:
+        """Take a frame into account."""
+        self._first = self._first or frame
+        self._last = frame
+        self.frames += 1
+        self.largest_overlap = max(self.largest_overlap, frame.ledger["largest_overlap"])
+        kinetic = frame.ledger["kinetic_translational"] + frame.ledger["kinetic_rotational"]
+        self._largest_kinetic = max(self._largest_kinetic, kinetic)
+        energy = _energy(frame)
+        self._largest_change = max(self._largest_change, abs(energy - _energy(self._first)))
+        self._least = min(self._least, energy)
+        self._largest_gain = max(self._largest_gain, energy - self._least)
+
+    @property
+    def simulated_seconds(self) -> float:
+        """Time between the first frame and the last [s]."""
+        return self._last.time - self._first.time if self._first and self._last else 0.0
+
+    @property
+    def impacts(self) -> int:
+        """Impacts up to the last frame."""
+        return int(self._last.ledger["impacts"]) if self._last else 0
+
+    @property
+    def unresolved(self) -> int:
+        """Steps that ended while something still approached."""
+        return int(self._last.ledger["unresolved"]) if self._last else 0
+
+    @property
+    def worst_energy_drift(self) -> float:
+        """Largest change of the total energy since the first frame, as a fraction of it."""
+        return self._of_all(self._largest_change)
+
+    @property
+    def forbidden_energy_drift(self) -> float:
+        """What of the change of energy should not be, as a fraction of all: if not ``elastic``, only what came back.
+
+        That is the largest rise above the least energy of the frames before.
+        """
+        return self._of_all(self._largest_change if self.elastic else self._largest_gain)
+
+    def _of_all(self, energy: float) -> float:
+        scale = max(self._largest_kinetic, _energy(self._first) if self._first else 0.0)
+        return energy / scale if scale else 0.0
+
+    @property
+    def momentum_error(self) -> float:
+        """Change of momentum that neither walls nor gravity account for, over the momentum of the fastest motion."""
+        if not (self._first and self._last and self._largest_kinetic):
+            return 0.0
+        first, last = self._first.ledger, self._last.ledger
+        given = last["wall_impulse"] - first["wall_impulse"]
+        to_walls = np.array([given[1] - given[0], given[3] - given[2], given[5] - given[4]])
+        fallen = self._mass * self._gravity * (self._last.time - self._first.time)
+        error = last["momentum"] - first["momentum"] + to_walls - fallen
+        return float(np.linalg.norm(error) / np.sqrt(2.0 * self._mass * self._largest_kinetic))
+
+
+def _energy(frame: Frame) -> float:
+    ledger = frame.ledger
+    return float(ledger["kinetic_translational"] + ledger["kinetic_rotational"] + ledger["potential"])

@@ -1,0 +1,33 @@
+"""The leaves of the octree as fine lines, coloured by their depth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from particlesim.rendering.gl import geometry
+from particlesim.rendering.shading.colour import map_colours
+from particlesim.scene import Scene
+from particlesim.scene.world import Octree
+from particlesim.trajectory.gsd_file import Frame, Header
+
+# Leaves at this depth or deeper have the last colour.
+_DEEPEST = 8
+
+
+def cell_lines(lower: np.ndarray, upper: np.ndarray, depth: np.ndarray, width: float) -> np.ndarray:
+    """Instances of a line layer for boxes ``lower`` .. ``upper`` (k, 3) [m] of ``depth`` (k,); ``width`` [pixels]."""
+    start, end = geometry.box_edges(np.asarray(lower), np.asarray(upper))
+    colour = np.empty((len(depth), 4))
+    colour[:, :3] = map_colours(np.asarray(depth) / _DEEPEST)
+    colour[:, 3] = 0.35
+    return geometry.lines(start.reshape(-1, 3), end.reshape(-1, 3), np.repeat(colour, 12, axis=0), width)
+
+
+def octree_cells(scene: Scene, header: Header, frame: Frame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lower and upper corners (k, 3) [m] and depths (k,) of the octree's leaves over the particles of a frame."""
+    from particlesim.broad_phase import octree_leaves  # noqa: PLC0415  (numba is slow to import)
+
+    chosen = scene.solver.broad_phase
+    octree = chosen if isinstance(chosen, Octree) else Octree(kind="octree")
+    upper = 0.5 * np.asarray(scene.world.size)
+    return octree_leaves(frame.position, frame.position, octree.max_count, octree.max_depth, -upper, upper)

@@ -1,0 +1,1 @@
+"""Colour, light and shade."""

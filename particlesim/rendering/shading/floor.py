@@ -1,0 +1,76 @@
+"""The soft shade that particles close above the floor leave on it, where they hide the sky."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from particlesim.core.jit import kernel
+from particlesim.rendering.visibility.instances import EVERYONE
+
+# The shade is told at points a particle's radius apart, and at most at so many along the floor's longer side.
+_POINTS = 192
+
+# Particles whose middle is at most so many of their radii above the floor are looked at. Over the last of these radii
+# their shade fades to nothing: it would blink as they fall.
+_HIGHEST = 3.0
+
+# Farther than so many heights, a sphere hides less than a fiftieth of what it hides below itself.
+_REACH = 3.6
+
+# The light of the sky at the floor, as a share of all its light.
+_SKY = 0.4
+
+
+class Ground:
+    """A floor, ``half`` (2,) [m] wide to each side of the origin, at ``height`` [m]; radii (n,) of what is above it."""
+
+    def __init__(self, half: np.ndarray, height: float, inner: np.ndarray, outer: np.ndarray) -> None:
+        self._half = np.asarray(half, dtype=np.float64)
+        self._height = height
+        # A hull hides about as much as a sphere between those within and about it.
+        self._radius = 0.5 * (inner + outer)
+        typical = float(np.median(self._radius)) if len(inner) else 0.0
+        self._step = max(2.0 * float(max(self._half)) / _POINTS, typical)
+
+    def light(self, position: np.ndarray, whose: slice | np.ndarray = EVERYONE) -> np.ndarray:
+        """Share of the light that reaches the floor, (b, a) float32, from its corner (-x, -y) to (x, y).
+
+        ``whose`` (m,) particle each of those at ``position`` (m, 3) is an image of (see cast.py).
+        """
+        width, depth = (max(1, round(2.0 * half / self._step)) for half in self._half)
+        light = np.ones((depth, width))
+        corner = np.array([*-self._half, self._height])
+        _shade(np.ascontiguousarray(position), self._radius[whose], corner, 2.0 * self._half, light)
+        return (1.0 - _SKY * (1.0 - light)).astype(np.float32)
+
+
+@kernel
+def _shade(position, radius, corner, size, light):
+    """Take away what each sphere close above the floor hides of an even sky.
+
+    At a distance d from the point below a sphere of radius r at height h that is (r / h)^2 / (1 + (d / h)^2)^(3/2) of
+    its light (plane element to sphere; J. R. Howell, A Catalog of Radiation Heat Transfer Configuration Factors).
+    """
+    rows, columns = light.shape
+    across, along = columns / size[0], rows / size[1]
+    for k in range(len(position)):
+        h = position[k, 2] - corner[2]
+        if not 0.0 < h < _HIGHEST * radius[k]:
+            continue
+        h = max(h, radius[k])
+        x, y, reach = position[k, 0] - corner[0], position[k, 1] - corner[1], _REACH * h
+        share = (radius[k] / h) ** 2 * min(_HIGHEST - h / radius[k], 1.0)
+        for row in range(max(0, math.ceil((y - reach) * along - 0.5)), min(rows, math.ceil((y + reach) * along))):
+            b = ((row + 0.5) / along - y) / h
+            for column in range(
+                max(0, math.ceil((x - reach) * across - 0.5)), min(columns, math.ceil((x + reach) * across))
+            ):
+                a = ((column + 0.5) / across - x) / h
+                d2 = a * a + b * b
+                # Fades to nothing where it ends.
+                fade = 1.0 - d2 / (_REACH * _REACH)
+                if fade > 0.0:
+                    hidden = share / ((1.0 + d2) * math.sqrt(1.0 + d2)) * fade
+                    light[row, column] *= 1.0 - hidden

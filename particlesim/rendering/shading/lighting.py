@@ -1,0 +1,61 @@
+"""The key light: where it stands, and the box of the world that its shadow map shows."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from particlesim.rendering.camera import light_azimuth
+from particlesim.rendering.visibility.projection import Outlook
+from particlesim.scene import Scene
+
+# Height of the key light above the horizon [degrees]: shadows stay short and under their particles.
+_ELEVATION = 58.0
+
+# What is behind another by less than this share of the depth of the box is not in its shadow.
+_BEFORE = 1.2e-3
+
+# The box is a little larger than the world, for what leans out of it.
+_ROOM = 1.04
+
+
+class Light(NamedTuple):
+    """A light from infinitely far. ``axes`` (3, 3): rows right, up and away from it; ``towards`` (3,): unit vector.
+
+    Its shadow map shows half the ``reach`` (3,) [m] to each side of the world's middle along the axes, in ``pixels``.
+    """
+
+    towards: np.ndarray
+    axes: np.ndarray
+    reach: np.ndarray
+    pixels: tuple[int, int]
+
+    @property
+    def outlook(self) -> Outlook:
+        """The light as one who looks."""
+        return Outlook(self.axes, np.zeros(3), True, self.pixels[0] / (2.0 * self.reach[0]), self.pixels)
+
+    def matrix(self, eye: np.ndarray) -> np.ndarray:
+        """From places seen from ``eye`` to coordinates in the shadow map, 0 .. 1, and closeness to the light [m].
+
+        (4, 4). Places seem a little closer than they are, or rounding would cast shadows.
+        """
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.axes * [[0.5 / self.reach[0]], [0.5 / self.reach[1]], [-1.0]]
+        matrix[:3, 3] = matrix[:3, :3] @ eye + [0.5, 0.5, _BEFORE * self.reach[2]]
+        return matrix
+
+
+def key_light(scene: Scene, pixels: int) -> Light:
+    """The light of a scene, with a shadow map of ``pixels`` along its longer side."""
+    a, e = np.radians([light_azimuth(scene), _ELEVATION])
+    towards = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    right = np.array([-np.sin(a), np.cos(a), 0.0])
+    axes = np.array([right, np.cross(towards, right), -towards])
+    reach = _ROOM * np.abs(axes) @ (0.5 * np.asarray(scene.world.size))
+    # Texels are squares in the world: the shorter side has fewer of them, and reaches as far as whole ones do.
+    texel = 2.0 * max(reach[:2]) / pixels
+    sides = np.ceil(2.0 * reach[:2] / texel - 1e-9).astype(int)
+    reach[:2] = 0.5 * texel * sides
+    return Light(towards, axes, reach, (int(sides[0]), int(sides[1])))

@@ -1,0 +1,155 @@
+"""Images to a file: H.264 movies through ffmpeg, single images through Pillow. A file appears only when it is whole."""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import subprocess
+import tempfile
+import threading
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from particlesim.core.atomic_write import appearing
+from particlesim.rendering.errors import RenderError
+from particlesim.rendering.gl.platform import ffmpeg
+
+# Images that wait for the encoder: enough to even out the two, few enough to cost little memory.
+_WAITING = 4
+
+# x264 divides its work by the number of threads, and the bytes depend on it: fixed, not the machine's.
+_THREADS = 4
+
+
+@dataclass(frozen=True)
+class MovieTimes:
+    """How a movie came about: frames, and seconds spent making the images and encoding them, side by side."""
+
+    frames: int
+    drawing: float
+    encoding: float
+
+
+def write_movie(
+    path: str | Path, images: Iterable[np.ndarray], fps: float, size: tuple[int, int], crf: int = 18
+) -> MovieTimes:
+    """Encode images (height, width, 3) uint8 sRGB of ``size`` (width, height, both even) as H.264, yuv420p.
+
+    ``crf`` is x264's constant rate factor, 0 (lossless) to 51 (smallest file). The same images give the same bytes.
+    Whatever goes wrong, ``path`` is whole or untouched. RenderError if ffmpeg fails or there is no image; ValueError
+    for an image of another size; OSError for a path that cannot be written.
+    """
+    with appearing(path) as hidden, _Encoder(_command(hidden, fps, size, crf), size) as encoder:
+        drawing, frames = 0.0, 0
+        source = iter(images)
+        while True:
+            start = time.perf_counter()
+            image = next(source, None)
+            drawing += time.perf_counter() - start
+            if image is None:
+                break
+            encoder.send(image)
+            frames += 1
+        if not frames:
+            raise RenderError(f"{path}: there are no frames to make a movie of")
+        encoder.finish()
+    return MovieTimes(frames, drawing, encoder.seconds)
+
+
+def write_image(path: str | Path, image: np.ndarray) -> None:
+    """Write an image (height, width, 3) uint8 sRGB in the format of the path's ending, such as .png.
+
+    RenderError for an ending that stands for no format; OSError for a path that cannot be written.
+    """
+    with appearing(path) as hidden:
+        try:
+            Image.fromarray(image).save(hidden)
+        except ValueError as error:
+            raise RenderError(f"{path}: {error}") from error
+
+
+class _Encoder:
+    """ffmpeg in a process of its own, fed by a thread, so that the next image is drawn while one is encoded."""
+
+    def __init__(self, command: list[str], size: tuple[int, int]) -> None:
+        self._size = size
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115  (closed in __exit__)
+        # A session of its own: Ctrl-C is for us to handle, and ends ffmpeg from here.
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=self._log, stderr=self._log, start_new_session=True
+        )
+        self._images: queue.Queue[np.ndarray | None] = queue.Queue(maxsize=_WAITING)
+        self._broken = threading.Event()
+        self._feeder = threading.Thread(target=self._feed, name="ffmpeg feeder", daemon=True)
+        self._feeder.start()
+        self.seconds = 0.0
+
+    def __enter__(self) -> _Encoder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._process.poll() is None:
+            self._process.kill()
+        self._images.put(None)
+        self._feeder.join()
+        self._process.wait()
+        self._log.close()
+
+    def send(self, image: np.ndarray) -> None:
+        """Hand over an image, waiting while the encoder is behind."""
+        width, height = self._size
+        if image.shape != (height, width, 3) or image.dtype != np.uint8:
+            raise ValueError(f"an image of shape {image.shape} {image.dtype}, not {(height, width, 3)} uint8")
+        if self._broken.is_set():
+            self._fail()
+        self._images.put(np.ascontiguousarray(image))
+
+    def finish(self) -> None:
+        """Wait until all is encoded."""
+        self._images.put(None)
+        self._feeder.join()
+        start = time.perf_counter()
+        if self._process.wait() or self._broken.is_set():
+            self._fail()
+        self.seconds += time.perf_counter() - start
+
+    def _feed(self) -> None:
+        pipe = self._process.stdin
+        assert pipe is not None
+        while (image := self._images.get()) is not None:
+            # A broken encoder still empties the queue: nobody may wait for it.
+            if not self._broken.is_set():
+                start = time.perf_counter()
+                try:
+                    pipe.write(image.data)
+                except OSError:
+                    self._broken.set()
+                self.seconds += time.perf_counter() - start
+        with contextlib.suppress(OSError):
+            pipe.close()
+
+    def _fail(self) -> None:
+        self._process.wait()
+        self._log.seek(0)
+        lines = self._log.read().decode(errors="replace").split("\n")
+        last = next((line.strip() for line in reversed(lines) if line.strip()), "no message")
+        raise RenderError(f"ffmpeg failed with exit status {self._process.returncode}: {last}")
+
+
+def _command(path: Path, fps: float, size: tuple[int, int], crf: int) -> list[str]:
+    rate = str(Fraction(fps).limit_denominator(1001))
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", rate, "-i", "-"]
+    # Video players take untagged colours for those of old television; these say what they are.
+    scale = "scale=out_color_matrix=bt709:out_range=tv:flags=bicubic+accurate_rnd+bitexact,format=yuv420p"
+    tags = ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"]
+    codec = ["-c:v", "libx264", "-preset", "veryfast", "-crf", str(crf), "-threads", str(_THREADS)]
+    # No versions, dates or settings in the file (unit type 6): the same images, the same bytes.
+    bare = ["-fflags", "+bitexact", "-flags:v", "+bitexact", "-bsf:v", "filter_units=remove_types=6"]
+    target = ["-movflags", "+faststart", "-f", "mp4", str(path)]
+    return [ffmpeg(), "-y", "-v", "error", *source, "-an", "-vf", scale, *codec, *tags, *bare, *target]

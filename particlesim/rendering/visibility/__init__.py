@@ -1,0 +1,1 @@
+"""What each pixel sees, found before anything is drawn."""

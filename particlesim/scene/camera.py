@@ -1,0 +1,197 @@
+"""The movie: its camera, its format, and what is drawn besides the particles."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Annotated, Any, Literal, Self, get_args
+
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from particlesim.scene.base import (
+    Colour,
+    Finite,
+    Flag,
+    Model,
+    NotNegative,
+    Number,
+    PlainFloat,
+    Positive,
+    PositiveNumber,
+    Vector,
+    shorthand,
+    whole,
+)
+from particlesim.scene.messages import hint, listed, must_be, one_of
+
+Elevation = Annotated[PlainFloat, Field(ge=-89, le=89), must_be("an angle from -89 to 89 degrees")]
+FieldOfView = Annotated[PlainFloat, Field(ge=2, le=149), must_be("an angle from 2 to 149 degrees")]
+
+
+# What a camera fits into the picture: along axes with walls or a period the world, along open ones the particles; or
+# either of them along all axes.
+Subject = Annotated[Literal["auto", "world", "particles"], one_of("auto", "world", "particles")]
+
+
+class _Aimed(Model):
+    """A camera in a given direction, as near as shows all of its subject, unless its distance is given."""
+
+    azimuth: Finite = 30.0  # [degrees] about z, from +x
+    elevation: Elevation = 20.0  # [degrees] above the horizon
+    field_of_view: FieldOfView = 40.0  # [degrees], vertical
+    subject: Subject = "auto"
+    zoom: Positive = 1.0  # how much larger than fitting
+    distance: Positive | None = None  # [m]
+
+    @model_validator(mode="after")
+    def _either(self) -> Self:
+        if self.distance is not None and self.zoom != 1.0:
+            raise ValueError("give zoom or distance, not both")
+        return self
+
+
+class FixedCamera(_Aimed):
+    """Stands still; a given distance is that from the middle of its subject."""
+
+    kind: Literal["fixed"]
+
+
+class _Placed(Model):
+    """A camera at ``position`` that looks at ``target`` [m]."""
+
+    position: Vector
+    target: Vector = (0.0, 0.0, 0.0)
+    field_of_view: FieldOfView = 40.0  # [degrees], vertical
+
+    @model_validator(mode="after")
+    def _apart(self) -> Self:
+        if self.position == self.target:
+            raise ValueError("position and target must differ")
+        return self
+
+
+class LookAtCamera(_Placed):
+    """Stands at ``position`` and looks at ``target`` [m]."""
+
+    kind: Literal["look-at"]
+
+
+def _not_zero(value: float) -> float:
+    if value == 0:
+        raise ValueError("zero")
+    return value
+
+
+class OrbitCamera(_Aimed):
+    """Circles the target once in ``period`` seconds, starting at the azimuth."""
+
+    kind: Literal["orbit"]
+    period: Annotated[Number, AfterValidator(_not_zero), must_be("a number of seconds, not 0")] = (
+        20.0  # [s]; negative turns the other way
+    )
+    target: Vector | None = None  # [m]; the middle of its subject if not given
+
+
+class CameraKey(_Placed):
+    """Where a camera is at one time."""
+
+    time: Finite  # [s]
+
+
+def _in_time(keys: list[CameraKey]) -> list[CameraKey]:
+    for before, after in itertools.pairwise(keys):
+        if after.time <= before.time:
+            raise ValueError(f"times must grow from key to key, but {after.time:g} follows {before.time:g}")
+    return keys
+
+
+class PathCamera(Model):
+    """Moves smoothly from key to key, at rest before the first and after the last."""
+
+    kind: Literal["path"]
+    keys: Annotated[list[CameraKey], Field(min_length=1), AfterValidator(_in_time)]
+
+
+_Cameras = Annotated[FixedCamera | LookAtCamera | OrbitCamera | PathCamera, Field(discriminator="kind")]
+Camera = Annotated[
+    _Cameras,
+    shorthand(
+        '"fixed", "orbit", or a table such as { kind = "look-at", position = [5, 3, 2] }',
+        _Cameras | Literal["fixed", "orbit"],
+    ),
+]
+
+
+def _even(value: int) -> int:
+    # H.264 with colours at half the resolution (yuv420p) has no odd edges.
+    if value % 2:
+        raise ValueError("odd")
+    return value
+
+
+Pixels = Annotated[int, Field(ge=64, le=7680), whole, AfterValidator(_even)]
+Resolution = Annotated[
+    tuple[Pixels, Pixels], must_be("[width, height] in pixels, two even whole numbers from 64 to 7680")
+]
+Quality = Annotated[Literal["draft", "normal", "high"], one_of("draft", "normal", "high")]
+
+# Width and height of pictures that do not say theirs [pixels].
+_SIZES: dict[str, tuple[int, int]] = {"draft": (640, 360), "normal": (1280, 720), "high": (1920, 1080)}
+
+
+class Movie(Model):
+    """The file that comes out."""
+
+    fps: Annotated[PlainFloat, Field(ge=1, le=240), must_be("a number of frames a second from 1 to 240")] = 30.0
+    speed: Annotated[PositiveNumber, must_be("a number of seconds above 0")] = 1.0  # of the scene, in one of the movie
+    quality: Quality = "normal"
+    resolution: Resolution | None = None  # [width, height] in pixels; by the quality if not given
+    background: Colour = "#f4f2ee"
+    crf: Annotated[int, Field(ge=0, le=51), whole, must_be("a whole number from 0 (lossless) to 51 (smallest)")] = (
+        18  # x264's constant rate factor: 6 more halve the file
+    )
+
+    fade: Annotated[NotNegative, must_be("a number of seconds of 0 or more")] = 0.0  # [s] at the start and at the end
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the pictures [pixels]."""
+        return self.resolution or _SIZES[self.quality]
+
+
+_Row = Literal[
+    "time", "particles", "impacts", "energy change",
+    "temperature", "pressure", "speed", "pairs tested", "broad phases",
+]  # fmt: skip
+_ROWS = get_args(_Row)
+_USUAL_ROWS = _ROWS[:4]
+
+
+def _readout(value: Any) -> Any:
+    """True, false or a list of rows. ValueError that names a word that is none."""
+    if isinstance(value, bool):
+        return value
+    what = f"must be true, false or a list of {listed(_ROWS)}"
+    if not isinstance(value, list | tuple):
+        raise ValueError(what)
+    for word in value:
+        if word not in _ROWS:
+            raise ValueError(what + (hint(word, _ROWS) if isinstance(word, str) else ""))
+    return list(value)
+
+
+class Show(Model):
+    """What is drawn besides the particles."""
+
+    box: Flag | None = None  # edges of the world; if not given, unless all axes are open
+    cells: Flag = False  # leaves of the octree
+    readout: Annotated[bool | list[str], BeforeValidator(_readout, json_schema_input_type=bool | list[_Row])] = (
+        True  # which rows; true stands for time, particles, impacts and energy change
+    )
+    legend: Flag | None = None  # scales of fields and names of colours; the scales alone if not given
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """The rows of the readout."""
+        if isinstance(self.readout, bool):
+            return _USUAL_ROWS if self.readout else ()
+        return tuple(self.readout)

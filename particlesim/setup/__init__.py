@@ -1,0 +1,1 @@
+"""From a scene to a model: where particles start and how."""

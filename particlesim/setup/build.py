@@ -1,0 +1,269 @@
+"""From a scene to arrays: the one gate where values are checked and types are settled."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from particlesim.broad_phase import find_pairs
+from particlesim.core.constants import (
+    APPROACH_TOLERANCE,
+    MAX_MANIFOLD,
+    OPEN,
+    PERIODIC,
+    RESTING_SINKING,
+    SINKING,
+    WALL,
+    WALL_NAMES,
+)
+from particlesim.geometry.shape_table import ShapeTable, stack_shapes
+from particlesim.geometry.shapes import CATALOGUE, Shape
+from particlesim.model.bodies import Constants, State, World, particle_constants
+from particlesim.model.touching import contact_now, touching_pairs, touching_walls, wall_of_partner
+from particlesim.scene import Scene
+from particlesim.scene.file import SceneError
+from particlesim.scene.groups import FixedSize, Group, ListPlacement, MeshShape, Turn
+from particlesim.setup.initial_motion import initial_state, random_quaternions
+from particlesim.setup.placement import positions
+
+# Density of particles that give neither density nor mass: water [kg/m^3].
+_DEFAULT_DENSITY = 1000.0
+
+# Particles that a list puts into each other deeper than this fraction of their sizes are refused.
+_TOLERATED_OVERLAP = 1e-9
+
+# A body whose inscribed sphere is this much smaller than its bounding one is a sheet.
+_FLATTEST = 1e-6
+
+# Bytes a particle takes: constants, state, boxes, and the broad phase and the candidate pairs at their largest.
+BYTES_PER_PARTICLE = 1000
+
+_BOUNDARIES = {"wall": WALL, "periodic": PERIODIC, "open": OPEN}
+
+
+class Built(NamedTuple):
+    """A scene as arrays."""
+
+    shapes: tuple[Shape, ...]
+    table: ShapeTable
+    world: World
+    constants: Constants
+    state: State
+
+
+def build(scene: Scene) -> Built:
+    """The arrays a simulation of ``scene`` starts from. SceneError if something does not fit or cannot be read."""
+    check_memory(scene.number)
+    randoms = [np.random.default_rng([scene.seed, g]) for g in range(len(scene.particles))]
+    shapes, shape_of_group = _shapes(scene)
+    table = stack_shapes(shapes)
+    world = build_world(scene)
+    constants = _constants(scene, shapes, shape_of_group, randoms)
+    _check_sizes(scene, world, constants)
+    _check_volume(scene, world, shapes, constants)
+    orientation = _orientations(scene, shapes, constants, randoms)
+    position = positions(scene, table, world, constants, orientation, randoms)
+    state = initial_state(scene, constants, position, orientation, randoms)
+    _check_apart(scene, table, world, constants, state)
+    return Built(tuple(shapes), table, world, constants, state)
+
+
+def build_world(scene: Scene) -> World:
+    """The world of a scene as arrays."""
+    half = 0.5 * np.array(scene.world.size)
+    boundary = np.array([_BOUNDARIES[name] for name in scene.world.boundary])
+    gravity = np.array(scene.world.gravity, dtype=np.float64)
+    loses = min([scene.world.restitution, *(g.restitution for g in scene.particles if g.restitution is not None)]) < 1.0
+    return World(
+        lower=-half,
+        upper=half,
+        boundary=boundary,
+        period=np.where(boundary == PERIODIC, 2.0 * half, 0.0),
+        gravity=gravity,
+        restitution=float(scene.world.restitution),
+        # The same fraction of the speed of a fall through the world.
+        still=APPROACH_TOLERANCE * float(np.sqrt(2.0 * np.abs(gravity) @ scene.world.size)),
+        sinking=RESTING_SINKING if gravity.any() and loses else SINKING,
+    )
+
+
+def _key(group: int, key: str) -> str:
+    return f"particles[{group}].{key}"
+
+
+def _shapes(scene: Scene) -> tuple[list[Shape], list[int]]:
+    """The different shapes of a scene, and which of them each group has."""
+    shapes: list[Shape] = []
+    numbers: dict[str, int] = {}
+    of_group = []
+    for g, group in enumerate(scene.particles):
+        if isinstance(group.shape, MeshShape) and not group.shape.file.is_file():
+            raise _shape_error(g, group, "is a folder" if group.shape.file.is_dir() else "no such file")
+        try:
+            shape = CATALOGUE[group.shape.kind](**group.shape.model_dump(exclude={"kind"}))
+        except (OSError, ValueError) as error:
+            raise _shape_error(g, group, " ".join(str(error).split())) from None
+        if shape.inradius <= _FLATTEST * shape.radius:
+            raise _shape_error(g, group, "is too flat to be a body")
+        name = group.shape.model_dump_json()
+        if name not in numbers:
+            numbers[name] = len(shapes)
+            shapes.append(shape)
+        of_group.append(numbers[name])
+    return shapes, of_group
+
+
+def _shape_error(g: int, group: Group, message: str) -> SceneError:
+    if isinstance(group.shape, MeshShape):
+        file = str(group.shape.file)
+        return SceneError(message.removeprefix(f"{file} "), _key(g, "shape.file"), file)
+    return SceneError(message, _key(g, "shape"))
+
+
+def _sizes(group: Group, random: np.random.Generator) -> np.ndarray:
+    """Sizes of a group's particles, (count,)."""
+    if isinstance(group.size, FixedSize):
+        return np.full(group.number, group.size.value)
+    if group.size.kind == "uniform":
+        return random.uniform(group.size.low, group.size.high, group.number)
+    return np.exp(random.uniform(math.log(group.size.low), math.log(group.size.high), group.number))
+
+
+def _constants(
+    scene: Scene, shapes: list[Shape], shape_of_group: list[int], randoms: list[np.random.Generator]
+) -> Constants:
+    counts = [group.number for group in scene.particles]
+    group_of = np.repeat(np.arange(len(counts)), counts)
+    shape = np.array(shape_of_group)[group_of]
+    size = np.concatenate([_sizes(g, r) for g, r in zip(scene.particles, randoms, strict=True)])
+    volume = np.array([s.volume for s in shapes])[shape] * size**3
+    density = np.array([_DEFAULT_DENSITY if g.density is None else g.density for g in scene.particles])[group_of]
+    mass = np.array([math.nan if g.mass is None else g.mass for g in scene.particles])[group_of]
+    density = np.where(np.isnan(mass), density, mass / volume)
+    usual = scene.world.restitution
+    restitution = np.array([usual if g.restitution is None else g.restitution for g in scene.particles])
+    return particle_constants(shapes, shape, group_of, size, density, restitution[group_of])
+
+
+def check_memory(particles: int) -> None:
+    """SceneError if this machine has no memory for so many particles."""
+    needed, there = BYTES_PER_PARTICLE * particles, _memory()
+    if needed > there:
+        message = (
+            f"{particles:,} particles need about {needed / 1e9:,.0f} GB of memory; there are {there / 1e9:,.0f} GB"
+        )
+        raise SceneError(message, "particles")
+
+
+def _memory() -> float:
+    """Bytes of memory that this process may have: the machine's, or what its container is allowed."""
+    machine = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    try:
+        return min(machine, float(Path("/sys/fs/cgroup/memory.max").read_text()))
+    except (OSError, ValueError):  # no container, or one that says "max"
+        return machine
+
+
+def _check_sizes(scene: Scene, world: World, constants: Constants) -> None:
+    """Walls must leave room, and a particle must not meet itself round a periodic world."""
+    for g, group in enumerate(scene.particles):
+        members = constants.group == g
+        value = group.size.value if isinstance(group.size, FixedSize) else None
+        widest = 2.0 * constants.radius[members].max(initial=0.0)
+        narrowest = 2.0 * constants.inradius[members].max(initial=0.0)
+        for axis, edge in enumerate(world.upper - world.lower):
+            if world.boundary[axis] == PERIODIC and widest >= 0.5 * edge:
+                message = (
+                    f"too large: particles span {widest:.4g} m; "
+                    f"in a periodic world they must span less than half of it, {0.5 * edge:.4g} m"
+                )
+                raise SceneError(message, _key(g, "size"), value)
+            if world.boundary[axis] == WALL and narrowest > edge:
+                message = f"too large: particles are {narrowest:.4g} m thick, between walls {edge:.4g} m apart"
+                raise SceneError(message, _key(g, "size"), value)
+
+
+def _check_volume(scene: Scene, world: World, shapes: list[Shape], constants: Constants) -> None:
+    """What is enclosed must have room."""
+    volumes = np.array([s.volume for s in shapes])[constants.shape] * constants.size**3
+    fill = float(volumes.sum() / (world.upper - world.lower).prod())
+    if fill > 1.0 and not (world.boundary == OPEN).any():
+        raise SceneError(f"do not fit: their volumes add up to {fill:.3g} times the world's", "particles")
+
+
+def _quaternion(orientation: tuple[float, ...] | Turn | str) -> np.ndarray:
+    """A scene's orientation as a unit quaternion (w, x, y, z); a word stands for the axes of the world."""
+    if isinstance(orientation, str):
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    if isinstance(orientation, Turn):
+        axis = np.array(orientation.axis) / np.linalg.norm(orientation.axis)
+        half = 0.5 * math.radians(orientation.angle)
+        return np.concatenate([[math.cos(half)], math.sin(half) * axis])
+    return np.array(orientation) / np.linalg.norm(orientation)
+
+
+def _turned(q: np.ndarray, into: np.ndarray) -> np.ndarray:
+    """Orientations (k, 4) of the described axes as orientations of the body axes that ``into`` turns into them."""
+    product = Rotation.from_quat(np.roll(q, -1, axis=-1)) * Rotation.from_quat(np.roll(into, -1))
+    return np.roll(product.as_quat(), 1, axis=-1)
+
+
+def _orientations(
+    scene: Scene, shapes: list[Shape], constants: Constants, randoms: list[np.random.Generator]
+) -> np.ndarray:
+    """Orientations of all particles, (n, 4)."""
+    parts = [np.zeros((0, 4))]
+    for g, (group, random) in enumerate(zip(scene.particles, randoms, strict=True)):
+        listed = isinstance(group.placement, ListPlacement)
+        if isinstance(group.placement, ListPlacement):
+            q = np.array([_quaternion(pose.orientation) for pose in group.placement.poses])
+        elif group.orientation == "random":
+            q = random_quaternions(random, group.number)
+        else:
+            q = np.tile(_quaternion(group.orientation), (group.number, 1))
+        frame = shapes[int(constants.shape[constants.group == g][0])].orientation if group.number else None
+        if frame is not None and frame[0] != 1.0 and (listed or group.orientation != "random"):
+            q = _turned(q, frame)
+        parts.append(q)
+    return np.ascontiguousarray(np.concatenate(parts))
+
+
+def _check_apart(scene: Scene, table: ShapeTable, world: World, constants: Constants, state: State) -> None:
+    """No particle may start inside another or outside a wall; touching is allowed."""
+    reach = constants.radius[:, None]
+    pairs = find_pairs(state.position - reach, state.position + reach, period=world.period)
+    points = np.empty((MAX_MANIFOLD, 3))
+    for contacts in (
+        touching_walls(table, world, constants, state),
+        touching_pairs(table, world, constants, state, pairs),
+    ):
+        for i, j in contacts.tolist():
+            separation, _, _, _ = contact_now(table, world, constants, state, i, j, points)
+            if separation < -_TOLERATED_OVERLAP * constants.radius[i]:
+                deep = f"{-separation:.3g} m"
+                if j < 0:
+                    raise _start_error(
+                        scene, constants, i, f"sticks {deep} through the {WALL_NAMES[wall_of_partner(j)]} wall"
+                    )
+                g, k = _place_in_group(constants, j)
+                raise _start_error(scene, constants, i, f"starts {deep} inside particle {k} of particles[{g}]")
+
+
+def _start_error(scene: Scene, constants: Constants, i: int, wrong: str) -> SceneError:
+    """What is wrong with where particle ``i`` starts, said of what put it there."""
+    g, k = _place_in_group(constants, i)
+    placement = scene.particles[g].placement
+    if isinstance(placement, ListPlacement):
+        return SceneError(wrong, _key(g, f"placement.poses[{k}].position"), placement.poses[k].position)
+    return SceneError(f"particle {k} {wrong}", _key(g, "placement"))
+
+
+def _place_in_group(constants: Constants, i: int) -> tuple[int, int]:
+    """Group of particle ``i`` and its number there."""
+    g = int(constants.group[i])
+    return g, i - int(np.searchsorted(constants.group, g))

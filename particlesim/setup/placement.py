@@ -1,0 +1,249 @@
+"""Where particles start: at random without overlap, on a lattice, in clusters, or where a list says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from particlesim.geometry.shape_table import ShapeTable
+from particlesim.model.bodies import Constants, World
+from particlesim.scene import Scene
+from particlesim.scene.file import SceneError
+from particlesim.scene.groups import (
+    ClusterPlacement,
+    Group,
+    LatticePlacement,
+    ListPlacement,
+    RandomPlacement,
+    Region,
+)
+from particlesim.setup.random_insertion import Placed, empty_space, extents, put_in_place, try_in_place
+
+# Random trials a particle before it is said not to fit. Equal spheres jam at a fill of 0.38 (J. Feder, J. Theor. Biol.
+# 87 (1980) 237-254); a fill of 0.3 takes the last of 10^5 of them 6000.
+_MAX_TRIALS = 30_000
+
+# Trials a call, where few particles are left and each gets several at once.
+_TRIALS_A_CALL = 4096
+
+# A crowd is jammed if, of this many particles or more, doubling the trials finds a place for less than a sixth; looked
+# at from _FIRST_LOOK trials on. At a fill of 0.33 it is a quarter, at 0.36 it is less.
+_CROWD = 50
+_FIRST_LOOK = 128
+_PLACED_BY_DOUBLING = 1.0 / 6.0
+
+
+def positions(
+    scene: Scene,
+    table: ShapeTable,
+    world: World,
+    constants: Constants,
+    orientation: np.ndarray,
+    randoms: list[np.random.Generator],
+) -> np.ndarray:
+    """Positions of all particles of a scene, (n, 3) [m]. SceneError if a group does not fit.
+
+    Lists and lattices come first; the rest is put between them at random, the largest particles first.
+    """
+    placed = empty_space(constants, world, len(constants.mass))
+    placed.orientation[:] = orientation
+    below, above = extents(table, constants, orientation)
+    groups = [np.flatnonzero(constants.group == g) for g in range(len(scene.particles))]
+    for g, (group, members) in enumerate(zip(scene.particles, groups, strict=True)):
+        if isinstance(group.placement, ListPlacement):
+            placed.position[members] = [pose.position for pose in group.placement.poses]
+        elif isinstance(group.placement, LatticePlacement):
+            room = (above[members] - below[members]).max(axis=0, initial=0.0)
+            placed.position[members] = _on_lattice(g, group.placement, world, len(members), room, randoms[g])
+        else:
+            continue
+        put_in_place(world, placed, members)
+    for level in range(int(placed.level.max(initial=-1)), -1, -1):
+        for g, (group, members) in enumerate(zip(scene.particles, groups, strict=True)):
+            if isinstance(group.placement, RandomPlacement | ClusterPlacement):
+                trials = _Trials(g, group.placement, world, below, above, randoms[g])
+                left = _insert((table, world, constants, placed), trials, members[placed.level[members] == level])
+                if left:
+                    raise _no_room(g, group, left)
+    return placed.position
+
+
+def _insert(where: tuple[ShapeTable, World, Constants, Placed], trials: _Trials, left: np.ndarray) -> int:
+    """Put the particles of ``left`` (m,) at random between those in place; how many found no room."""
+    before, look, tried = len(left), _FIRST_LOOK, 0
+    while len(left) and tried < _MAX_TRIALS:
+        each = max(_TRIALS_A_CALL // len(left), 1)
+        proposals = trials.draw(np.repeat(left, each)).reshape(len(left), each, 3)
+        left = left[~try_in_place(*where, left, proposals)]
+        tried += each
+        if tried >= look:
+            if look > _FIRST_LOOK and len(left) > max(_CROWD, (1.0 - _PLACED_BY_DOUBLING) * before):
+                break
+            before, look = len(left), 2 * look
+    return len(left)
+
+
+def _no_room(g: int, group: Group, left: int) -> SceneError:
+    wider = "a wider spread" if isinstance(group.placement, ClusterPlacement) else "more room, or a lattice"
+    message = f"no room for {left:,} of them at random: fewer or smaller particles, {wider}"
+    return SceneError(message, f"particles[{g}].count", group.number)
+
+
+def _bounds(region: Region | None, world: World) -> tuple[np.ndarray, np.ndarray]:
+    if region is None:
+        return world.lower, world.upper
+    return np.array(region.lower), np.array(region.upper)
+
+
+def lattice_points(lower: np.ndarray, upper: np.ndarray, count: int, spacing: float | None) -> tuple[np.ndarray, float]:
+    """The first ``count`` points of a simple cubic lattice centred in a box, from the bottom up, and its spacing [m].
+
+    Without a spacing the widest is taken that has enough points. Fewer points come back if the box holds no more.
+    """
+    edges = upper - lower
+    if spacing is None:
+        # No spacing above the first holds one point across and enough in all; half of it always does.
+        most = min(edges.min(), (edges / count ** (1.0 / 3.0)).prod() ** (1.0 / 3.0))
+        least = 0.5 * most
+        for _ in range(60):
+            middle = 0.5 * (least + most)
+            enough = np.floor(edges / middle + 1e-9).prod() >= count
+            least, most = (middle, most) if enough else (least, middle)
+        spacing = float((edges / np.floor(edges / least + 1e-9)).min())
+    along = np.maximum(np.floor(np.minimum(edges / spacing + 1e-9, count)), 0).astype(np.int64)
+    number = np.arange(min(count, math.prod(along.tolist())))
+    x, y, z = number % along[0], number // along[0] % along[1], number // (along[0] * along[1])
+    points = 0.5 * (lower + upper) + (np.column_stack([x, y, z]) - 0.5 * (along - 1)) * spacing
+    return points, spacing
+
+
+def _on_lattice(
+    g: int,
+    lattice: LatticePlacement,
+    world: World,
+    count: int,
+    room: np.ndarray,
+    random: np.random.Generator,
+) -> np.ndarray:
+    """Lattice points, jittered within the gaps that particles of extent ``room`` (3,) leave."""
+    lower, upper = _bounds(lattice.region, world)
+    points, spacing = np.zeros((0, 3)), 1.0
+    if count and _is_round(lattice.region):
+        points, spacing = _round_lattice(lower, upper, count, lattice.spacing, room)
+    elif count:
+        points, spacing = lattice_points(lower, upper, count, lattice.spacing)
+    if len(points) < count and lattice.spacing is not None:
+        message = f"makes a lattice of {len(points):,} points here, for {count:,} particles"
+        raise SceneError(message, f"particles[{g}].placement.spacing", lattice.spacing)
+    if (room > spacing).any():
+        span = f"the particles span {room.max():.4g} m"
+        if lattice.spacing is None:
+            message = f"a lattice of so many points has a spacing of {spacing:.4g} m, but {span}"
+            raise SceneError(message, f"particles[{g}].count", count)
+        raise SceneError(f"too tight: {span}", f"particles[{g}].placement.spacing", lattice.spacing)
+    moved = points + random.uniform(-0.5, 0.5, points.shape) * (lattice.jitter * (spacing - room))
+    if _is_round(lattice.region):
+        outside = _from_middle(moved, lower + 0.5 * room, upper - 0.5 * room) > 1.0
+        moved[outside] = points[outside]
+    return moved
+
+
+def _round_lattice(
+    lower: np.ndarray, upper: np.ndarray, count: int, spacing: float | None, room: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """As ``lattice_points``, but those nearest to the middle of an ellipsoid in a box; particles span ``room`` (3,).
+
+    Without a spacing, fewer come back only if the last one tried is too tight for the particles.
+    """
+    edges = upper - lower
+    tried = spacing or float((np.pi / 6.0 * edges.prod() / count) ** (1.0 / 3.0))
+    while True:
+        points, _ = lattice_points(lower, upper, np.iinfo(np.int64).max, tried)
+        distance = _from_middle(points, lower + 0.5 * room, upper - 0.5 * room)
+        inside = np.argsort(distance, kind="stable")[: min(count, int(np.count_nonzero(distance <= 1.0)))]
+        if len(inside) == count or spacing is not None or (room > tried).any():
+            return points[np.sort(inside)], tried
+        tried *= 0.995
+
+
+def _is_round(region: Region | None) -> bool:
+    return region is not None and region.form == "ellipsoid"
+
+
+def _from_middle(points: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Distance of points (m, 3) from the middle of a box, 1 on the ellipsoid that just fits into it."""
+    # One without room has its middle only; what is off it is far away, by a number that has a square.
+    half = np.maximum(0.5 * (upper - lower), 1e-100)
+    return np.linalg.norm((points - 0.5 * (lower + upper)) / half, axis=-1)
+
+
+def _centres(
+    g: int, where: ClusterPlacement, lower: np.ndarray, upper: np.ndarray, random: np.random.Generator
+) -> np.ndarray:
+    """Centres of the clusters, (clusters, 3) [m]."""
+    is_round = _is_round(where.region)
+    if where.centres is None and is_round:
+        way = random.normal(size=(where.clusters or 1, 3))
+        way *= random.uniform(size=(len(way), 1)) ** (1.0 / 3.0) / np.linalg.norm(way, axis=1, keepdims=True)
+        return 0.5 * (lower + upper) + 0.5 * (upper - lower) * way
+    if where.centres is None:
+        return random.uniform(lower, upper, (where.clusters or 1, 3))
+    for k, centre in enumerate(where.centres):
+        outside = (np.array(centre) < lower).any() or (np.array(centre) > upper).any()
+        if outside or (is_round and _from_middle(np.array(centre), lower, upper) > 1.0):
+            raise SceneError(
+                "lies outside of where its particles may be", f"particles[{g}].placement.centres[{k}]", centre
+            )
+    return np.array(where.centres)
+
+
+class _Trials:
+    """Random proposals for the positions of a group's particles."""
+
+    def __init__(
+        self,
+        g: int,
+        where: RandomPlacement | ClusterPlacement,
+        world: World,
+        below: np.ndarray,
+        above: np.ndarray,
+        random: np.random.Generator,
+    ) -> None:
+        self._where, self._random = where, random
+        lower, upper = _bounds(where.region, world)
+        # A particle stays within its region, but where a region spans a periodic world only its centre does.
+        free = (world.period > 0.0) & (lower <= world.lower) & (upper >= world.upper)
+        self._lower = lower - np.where(free, 0.0, below)
+        self._upper = upper - np.where(free, 0.0, above)
+        self._centres = np.zeros((0, 3))
+        if isinstance(where, ClusterPlacement):
+            self._centres = _centres(g, where, lower, upper, random)
+        self._key = f"particles[{g}].size"
+
+    def draw(self, who: np.ndarray) -> np.ndarray:
+        """A position for each particle of ``who`` (m,), (m, 3)."""
+        lower, upper = self._lower[who], self._upper[who]
+        if (lower > upper).any():
+            raise SceneError("too large: there are particles wider than the region they are placed in", self._key)
+        points = self._proposed(who, lower, upper)
+        is_round = _is_round(self._where.region)
+        # What falls outside is drawn again, so that the blob is cut off rather than piled up at the wall.
+        for _ in range(100):
+            outside = ((points < lower) | (points > upper)).any(axis=1)
+            if is_round:
+                outside |= _from_middle(points, lower, upper) > 1.0
+            if not outside.any():
+                return points
+            points[outside] = self._proposed(who[outside], lower[outside], upper[outside])
+        points = np.clip(points, lower, upper)
+        if is_round:
+            middle = 0.5 * (lower + upper)
+            points = middle + (points - middle) / np.maximum(_from_middle(points, lower, upper), 1.0)[:, None]
+        return points
+
+    def _proposed(self, who: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+        if isinstance(self._where, RandomPlacement):
+            return self._random.uniform(lower, upper)
+        around = self._centres[who % len(self._centres)]
+        return around + self._where.spread * self._random.normal(size=(len(who), 3))

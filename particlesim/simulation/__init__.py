@@ -1,0 +1,1 @@
+"""The loop, and what there is to see of it."""

@@ -1,0 +1,1 @@
+"""What was simulated, frame by frame, and the file it is kept in."""

@@ -1,0 +1,34 @@
+"""The boxes along the axes that the particles of a frame are in: what a broad phase searches."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from particlesim.core.constants import SPHERE
+from particlesim.trajectory.gsd_file import Frame, Header
+
+
+def frame_boxes(header: Header, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corners (n, 3) float64 [m] of the boxes of all particles of a frame."""
+    lower, upper = np.empty_like(frame.position), np.empty_like(frame.position)
+    for number, shape in enumerate(header.shapes):
+        members = np.flatnonzero(header.shape == number)
+        size = header.size[members, None]
+        if shape.kind == SPHERE:
+            low, high = -0.5 * size, 0.5 * size
+        else:
+            vertices = np.einsum("nij,vj->nvi", _matrices(frame.orientation[members]), shape.vertices)
+            low, high = size * vertices.min(axis=1), size * vertices.max(axis=1)
+        lower[members], upper[members] = frame.position[members] + low, frame.position[members] + high
+    return lower, upper
+
+
+def _matrices(orientation: np.ndarray) -> np.ndarray:
+    """Rotation matrices (n, 3, 3) of unit quaternions (n, 4), body to world."""
+    w, x, y, z = orientation.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
