@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from particlesim import shapes
+from particlesim.geometry import shapes
 
 # Both searches of coal stop here [fraction of the distance, and m].
 _COAL_TOLERANCE = 1e-12

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from particlesim import crew
-from particlesim.core.constants import LONGEST_STRETCH
+from particlesim.core import parallel as crew
+from particlesim.core.constants import MAX_SUBSTEP_DISPLACEMENT
 from particlesim.model.touching import deepest_overlap
 from particlesim.simulation.simulation import Simulation
 from tests.brute_force import Spheres
@@ -302,7 +302,7 @@ def test_a_ball_knocked_far_off_is_followed_while_others_meet_unforeseen():
     resting = [{"position": (3.0 * (k % 60), 3.0 * (k // 60), -40)} for k in range(3000)]
     balls = listed("sphere", *aside, *resting, mass=1.0)
     sim = Simulation(scene(heavy, far, balls, size=(400, 400, 400), boundary="open", step=0.09))
-    assert sim._flight.longest_stretch(LONGEST_STRETCH) > 0.09
+    assert sim._flight.longest_stretch(MAX_SUBSTEP_DISPLACEMENT) > 0.09
     sim.step()
     velocity = sim.particles.velocity
     assert sim.ledger.impacts == 4

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.core.jit import borrowed, kernel
+from particlesim.core.jit import kernel, without_refcounts
 
 
 class Things(NamedTuple):
@@ -24,7 +24,7 @@ def _sum_of_part(things, first, last):
 
 @kernel
 def _sum_and_count(things, counted):
-    things, counted = borrowed((things, counted))
+    things, counted = without_refcounts((things, counted))
     total = 0.0
     for k in range(len(counted)):
         counted[k] += 1

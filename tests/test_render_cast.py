@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 
-from particlesim import shapes
+from particlesim.geometry import shapes
 from particlesim.rendering.visibility.geometry_tables import bodies_of
 from particlesim.rendering.visibility.instances import cast_of, images_of
 from tests.test_render_picture import covered, draw, edge, make_frame, make_header, make_scene, seen

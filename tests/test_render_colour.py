@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from particlesim import shapes
+from particlesim.geometry import shapes
 from particlesim.rendering.gl import geometry
 from particlesim.rendering.octree_cells import cell_lines
 from particlesim.rendering.shading.colour import PALETTE, ParticleColours, map_colours, parse, shape_colours

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from particlesim.rendering import RenderError, movie, write_image, write_movie
+from particlesim.rendering import RenderError, write_image, write_movie
+from particlesim.rendering.video import encoder as movie
 from particlesim.rendering.video.fade import faded, strength
 
 SIZE = (130, 98)  # even, but no multiples of the 16 pixels that encoders like

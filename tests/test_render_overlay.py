@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from particlesim import shapes
 from particlesim.broad_phase import METHODS
+from particlesim.geometry import shapes
 from particlesim.rendering.hud.legend import swatches
 from particlesim.rendering.hud.overlay import Overlay, legend_places
 from particlesim.rendering.hud.panel import Panel, Style

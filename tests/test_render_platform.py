@@ -6,7 +6,8 @@ import sys
 
 import pytest
 
-from particlesim.rendering import RenderError, platform
+from particlesim.rendering import RenderError
+from particlesim.rendering.gl import platform
 
 DRAW = """
 import numpy as np

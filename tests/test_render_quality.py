@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from particlesim import shapes
 from particlesim.core.parallel import use_threads
+from particlesim.geometry import shapes
 from particlesim.rendering import Renderer
 from particlesim.rendering.quality import PRESETS
 from particlesim.scene import Scene

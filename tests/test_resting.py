@@ -52,7 +52,7 @@ def test_a_ball_at_rest_is_sent_off_by_one_that_hits_it():
     table = scene(listed("sphere", lying, coming), size=(30, 4, 4), gravity=GRAVITY)
     sim, _ = settled(table, 1.5, 3)
     assert np.allclose(sim.particles.velocity[:, :2], [(2, 0), (0, 0)], rtol=0, atol=1e-6)
-    # Sent off it may leave the floor by the depth that touches may go (SINKING), as it rebounds in full.
+    # Sent off it may leave the floor by the depth that touches may go (PENETRATION_SLOP), as it rebounds in full.
     assert (np.abs(sim.particles.velocity[:, 2]) < 5e-3).all()
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from particlesim import shapes
 from particlesim.core.constants import MAX_MANIFOLD
-from particlesim.core.math3d import matrix_of
+from particlesim.core.math3d import quat_to_matrix
 from particlesim.dynamics.contact.contact_points import COLUMNS, LEVER_I, handed_down
+from particlesim.geometry import shapes
 from particlesim.geometry.narrow_phase.contact_manifold import hull_patch
 from particlesim.geometry.shape_table import stack_shapes
 from particlesim.simulation.simulation import Simulation
@@ -140,7 +140,7 @@ def test_a_ball_keeps_its_speed_along_what_it_rests_on():
 def test_an_inclined_face_over_another_comes_nowhere_nearer_than_it_is(first):
     """A cube that leans over the flat top of another: the nearest of its points is one of its own, not beyond them."""
     lean, lift = np.array([np.cos(0.05), 0.0, np.sin(0.05), 0.0]), 1e-3
-    matrices = [(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), matrix_of(tuple(lean))]
+    matrices = [(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), quat_to_matrix(tuple(lean))]
     lowest = float(np.min(shapes.cube().vertices @ np.reshape(matrices[1], (3, 3))[2]))
     offset, normal = np.array([-0.2, 0.0, 0.5 + lift - lowest]), np.array([0.0, 0.0, 1.0])
     if first:

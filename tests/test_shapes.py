@@ -8,8 +8,8 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 import particlesim as ps
-from particlesim import shapes
 from particlesim.core.constants import HULL, SPHERE
+from particlesim.geometry import shapes
 from particlesim.geometry.mass_properties import mass_properties, principal_axes
 from particlesim.geometry.shape_table import stack_shapes
 from tests import oracles

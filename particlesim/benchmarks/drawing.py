@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.core.atomic_write import appearing
+from particlesim.core.atomic_write import atomic_write
 from particlesim.geometry.shapes import CATALOGUE
 from particlesim.rendering import RenderError
 from particlesim.scene import Scene
@@ -113,7 +113,7 @@ def available_drawers() -> list[str]:
 def write(path: Path, pictures: Sequence[Drawn]) -> None:
     """The figures as JSON, in a file that appears whole or not at all. OSError if it cannot be written."""
     rows = [asdict(drawn) | {"median": drawn.median} for drawn in pictures]
-    with appearing(path) as hidden:
+    with atomic_write(path) as hidden:
         hidden.write_text(json.dumps({"size": SIZE, "pictures": rows}, indent=2) + "\n", encoding="utf-8")
 
 

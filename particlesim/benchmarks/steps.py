@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numba
 
-from particlesim.core.atomic_write import appearing
+from particlesim.core.atomic_write import atomic_write
 from particlesim.core.parallel import available_threads, use_threads
 from particlesim.scene import Scene
 from particlesim.setup.build import check_memory
@@ -205,7 +205,7 @@ def write(path: Path, speeds: Sequence[Speed]) -> None:
         "time_step": time_step(),
         "gases": [asdict(speed) | {"rate": speed.rate, "spread": speed.spread} for speed in speeds],
     }
-    with appearing(path) as hidden:
+    with atomic_write(path) as hidden:
         hidden.write_text(json.dumps(what, indent=2) + "\n", encoding="utf-8")
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from particlesim.broad_phase.aabb_test import SLACK
 from particlesim.core.jit import kernel
-from particlesim.core.parallel import Crew
+from particlesim.core.parallel import ThreadTeam
 
 # The typical place and size are taken from this many boxes, picked by multiples of a prime modulo the number of
 # boxes: no pattern in the order of the particles is met in step.
@@ -121,7 +121,7 @@ def _region(extremes, typical, period, region):
         region[1, axis] = high
 
 
-def survey(lower: np.ndarray, upper: np.ndarray, period: np.ndarray, crew: Crew) -> Survey:
+def survey(lower: np.ndarray, upper: np.ndarray, period: np.ndarray, crew: ThreadTeam) -> Survey:
     """Look at all boxes once.  ``lower``, ``upper`` (n, 3) float64 [m], n > 0; ``period`` (3,) [m]."""
     parts = np.empty((crew.threads, 4, 3))
     crew.each(lambda thread, a, b: _extremes(a, b, lower, upper, period, parts[thread]), len(lower))

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from particlesim.core.jit import kernel
-from particlesim.core.parallel import Crew
+from particlesim.core.parallel import ThreadTeam
 
 # Candidates that are decided at a time: two lists of as many uint32, which stay in the fastest cache.
 BATCH = 2048
@@ -95,7 +95,7 @@ def append_overlaps(candidates, size, boxes, order, period, wraps, keys, found):
 
 
 def collect(
-    search: Callable[[int, int, np.ndarray], tuple[int, int]], count: int, crew: Crew, expected: int
+    search: Callable[[int, int, np.ndarray], tuple[int, int]], count: int, crew: ThreadTeam, expected: int
 ) -> tuple[list[np.ndarray], int]:
     """Run ``search(first, last, keys) -> (found, tested)`` over ``0 .. count``; the lists of keys and tests made.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.core.jit import kernel
-from particlesim.core.parallel import Crew
+from particlesim.core.parallel import ThreadTeam
 
 
 @kernel
@@ -38,7 +38,7 @@ def _place(first, last, keys, order, shift, cursors, keys_out, order_out):
 
 
 def counting_sort(
-    keys: np.ndarray, order: np.ndarray, buckets: int, crew: Crew, *, shift: int
+    keys: np.ndarray, order: np.ndarray, buckets: int, crew: ThreadTeam, *, shift: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Sort by the bucket ``key >> shift``, below ``buckets``, of which there are few; equal ones stay in order.
 

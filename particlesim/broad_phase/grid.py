@@ -16,7 +16,7 @@ from particlesim.broad_phase.counting_sort import counting_sort
 from particlesim.broad_phase.grid_layout import Layout, buckets_of_box, fill_keys, lay_out
 from particlesim.broad_phase.pair_sort import canonical
 from particlesim.core.jit import kernel
-from particlesim.core.parallel import Crew
+from particlesim.core.parallel import ThreadTeam
 
 # Ranges of candidates that are listed before they are tested, or as many as one box has: 192 kB.
 _RANGES = 16384
@@ -221,7 +221,7 @@ def _search_large(first, last, boxes, order, starts, cells, shape, origin, inver
 
 
 def _sorted_into_buckets(
-    lower: np.ndarray, upper: np.ndarray, numbers: np.ndarray, period: np.ndarray, plan: Layout, crew: Crew
+    lower: np.ndarray, upper: np.ndarray, numbers: np.ndarray, period: np.ndarray, plan: Layout, crew: ThreadTeam
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Rows of boxes in the order of their buckets, their numbers and buckets, and where each bucket starts.
 
@@ -260,7 +260,7 @@ def _sorted_into_buckets(
 
 
 def _search(
-    lower: np.ndarray, upper: np.ndarray, numbers: np.ndarray, period: np.ndarray, cells: int, crew: Crew
+    lower: np.ndarray, upper: np.ndarray, numbers: np.ndarray, period: np.ndarray, cells: int, crew: ThreadTeam
 ) -> tuple[list[np.ndarray], int, np.ndarray]:
     """Pairs of which at least one box fits the cells, tests, and the ``numbers`` of the boxes that do not."""
     plan = lay_out(survey(lower, upper, period, crew), period, len(lower), cells)
@@ -310,7 +310,7 @@ def grid_pairs(
     numbers = np.arange(count, dtype=np.int32)
     lists: list[np.ndarray] = []
     tested = 0
-    crew = Crew(count)
+    crew = ThreadTeam(count)
     left, wanted = numbers, cells or 0
     while len(left):
         all_left = len(left) == count

@@ -11,7 +11,7 @@ import numpy as np
 
 from particlesim.broad_phase.aabb_statistics import Survey, wrapped_centre
 from particlesim.core.jit import kernel
-from particlesim.core.parallel import Crew
+from particlesim.core.parallel import ThreadTeam
 
 # Levels of octants in a code, three bits each; three bits for the size class stand above them.
 LEVELS = 20
@@ -73,7 +73,7 @@ def _fill_codes(first, last, lower, upper, period, origin, inverse, widest, code
 
 
 def codes_of(
-    lower: np.ndarray, upper: np.ndarray, period: np.ndarray, seen: Survey, inverse: float, crew: Crew
+    lower: np.ndarray, upper: np.ndarray, period: np.ndarray, seen: Survey, inverse: float, crew: ThreadTeam
 ) -> np.ndarray:
     """Codes (n,) int64 of all boxes in the cube of edge 1 / ``inverse`` [m] about the region of most centres."""
     codes = np.empty(len(lower), dtype=np.int64)

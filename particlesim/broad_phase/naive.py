@@ -8,7 +8,7 @@ from particlesim.broad_phase.aabb_test import BATCH, any_wraps, append_overlaps,
 from particlesim.broad_phase.pair_sort import canonical
 from particlesim.broad_phase.soa_aabb import LANES, column_of, lowest, overlap_bits
 from particlesim.core.jit import kernel
-from particlesim.core.parallel import Crew
+from particlesim.core.parallel import ThreadTeam
 
 # Boxes that are tested against a whole range before the next is taken: 24 kB, which stay in the fastest cache.
 TILE = 1024
@@ -52,7 +52,7 @@ def naive_pairs(lower: np.ndarray, upper: np.ndarray, period: np.ndarray) -> tup
         columns[:, :count] = boxes.T
     for axis in np.flatnonzero(period > 0.0):
         columns[axis], columns[axis + 3] = -np.inf, np.inf  # the box test alone knows of images
-    crew = Crew(count)
+    crew = ThreadTeam(count)
     lists, tested = collect(
         lambda first, last, keys: _search(first, last, columns, boxes, order, period, keys), count, crew, 4 * count
     )

@@ -19,7 +19,7 @@ from particlesim.broad_phase.octree_build import CHILD, CHILDREN, START, STOP, b
 from particlesim.broad_phase.pair_sort import canonical
 from particlesim.broad_phase.soa_aabb import LANES, child_bits, column_of, lowest, may_overlap, overlap_bits
 from particlesim.core.jit import kernel
-from particlesim.core.parallel import Crew
+from particlesim.core.parallel import ThreadTeam
 
 # Boxes near a leaf that are listed before all boxes of the leaf are tested against them: 24 kB of columns.
 _LIST = 1024
@@ -195,7 +195,7 @@ def _images(period: np.ndarray, seen: Survey, scale: float) -> tuple[np.ndarray,
 
 
 def _candidates(
-    lower: np.ndarray, upper: np.ndarray, period: np.ndarray, max_count: int, max_depth: int, crew: Crew
+    lower: np.ndarray, upper: np.ndarray, period: np.ndarray, max_count: int, max_depth: int, crew: ThreadTeam
 ) -> tuple[list[np.ndarray], int, bool]:
     """Lists of pairs of boxes that overlap, the number of box tests, and whether a pair may be there more than once."""
     count = len(lower)
@@ -240,7 +240,7 @@ def octree_pairs(
     count = len(lower)
     if count == 0:
         return np.empty((0, 2), dtype=np.int64), 0
-    crew = Crew(count)
+    crew = ThreadTeam(count)
     # What the search needs is given back before the pairs are sorted: that takes the most memory of all.
     lists, tested, unique = _candidates(lower, upper, period, max_count, max_depth, crew)
     return canonical(lists, count, crew, unique=unique), tested

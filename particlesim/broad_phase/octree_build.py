@@ -9,7 +9,7 @@ from particlesim.broad_phase.counting_sort import counting_sort
 from particlesim.broad_phase.morton import CLASS_SHIFT, CODE_BITS, LEVELS
 from particlesim.broad_phase.soa_aabb import LANES
 from particlesim.core.jit import kernel
-from particlesim.core.parallel import ALONE, Crew
+from particlesim.core.parallel import ALONE, ThreadTeam
 
 # Columns of ``nodes`` (k, 4) int32: the range of boxes, the first child (the others follow it), how many; a leaf
 # has none.  Node 0 is the root; children stand after their parents.
@@ -82,7 +82,7 @@ def _sort_deeper(first, last, shift, lowest, max_count, starts, codes, order, sp
 
 
 def sort_by_code(
-    codes: np.ndarray, order: np.ndarray, max_count: int, max_depth: int, crew: Crew
+    codes: np.ndarray, order: np.ndarray, max_count: int, max_depth: int, crew: ThreadTeam
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sort ``codes`` (n,) int64 with ``order`` (n,) int32, as far as nodes of ``max_count`` boxes need it.
 
@@ -200,7 +200,7 @@ def in_order(
     period: np.ndarray,
     seen: Survey,
     scale: float,
-    crew: Crew,
+    crew: ThreadTeam,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The boxes that ``order`` (n,) names: rows (n, 6) float64 [m], and columns (6, n + LANES) float32.
 
@@ -249,7 +249,7 @@ def _fit_parents(nodes, bounds):
                 bounds[axis + 3, node] = high
 
 
-def fit(nodes: np.ndarray, columns: np.ndarray, crew: Crew) -> np.ndarray:
+def fit(nodes: np.ndarray, columns: np.ndarray, crew: ThreadTeam) -> np.ndarray:
     """Bounds (6, k + LANES) float32 of the columns in each node."""
     bounds = np.zeros((6, len(nodes) + LANES), dtype=np.float32)
     crew.each(lambda _, first, last: _fit_leaves(first, last, nodes, columns, bounds), len(nodes), 4 * crew.threads)

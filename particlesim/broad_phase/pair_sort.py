@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.core.jit import kernel
-from particlesim.core.parallel import Crew
+from particlesim.core.parallel import ThreadTeam
 
 # Rows in a band, 2**BAND at first: the counters of a band, 32 kB, stay in the fastest cache.  Bands are made wider
 # until there are at most MOST_BANDS: so many places can be written to by turns.
@@ -108,7 +108,7 @@ def _write_band(keys, first_row, rows, unique, pairs):
     return _compact(pairs) if unique else keys.size
 
 
-def _banded(lists: list[np.ndarray], bands: int, band: int, crew: Crew) -> tuple[np.ndarray, np.ndarray]:
+def _banded(lists: list[np.ndarray], bands: int, band: int, crew: ThreadTeam) -> tuple[np.ndarray, np.ndarray]:
     """All keys in the order of their bands, and where each band starts (bands + 1,) int64."""
     counts = np.zeros((len(lists), bands), dtype=np.int64)
     shift = band + 32
@@ -130,7 +130,7 @@ def _banded(lists: list[np.ndarray], bands: int, band: int, crew: Crew) -> tuple
     return keys, np.append(0, ends[-1])
 
 
-def canonical(lists: list[np.ndarray], count: int, crew: Crew, *, unique: bool = False) -> np.ndarray:
+def canonical(lists: list[np.ndarray], count: int, crew: ThreadTeam, *, unique: bool = False) -> np.ndarray:
     """All keys of ``lists`` as (m, 2) int64 pairs sorted by (i, j), among ``count`` boxes; uses up the lists.
 
     ``unique``: the lists may hold a pair more than once; it comes out once.

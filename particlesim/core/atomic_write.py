@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 @contextlib.contextmanager
-def appearing(path: str | Path) -> Iterator[Path]:
+def atomic_write(path: str | Path) -> Iterator[Path]:
     """A hidden file beside ``path`` to write to: it becomes ``path`` at the end, or is removed if anything fails.
 
     FileNotFoundError if the folder does not exist.

@@ -19,7 +19,7 @@ WALL_NAMES = ("-x", "+x", "-y", "+y", "-z", "+z")
 STEP_FRACTION = 0.125
 
 # A time step in which they would move farther than this is taken in several stretches.
-LONGEST_STRETCH = 0.4
+MAX_SUBSTEP_DISPLACEMENT = 0.4
 
 # Two faces, or an edge and a face, closer to parallel than this touch along a patch, not at a point [sine of the
 # angle].  Rounding turns a face by about 1e-15; a fall of one radius at this angle shifts the contact by 1e-6 of it.
@@ -31,11 +31,11 @@ MAX_MANIFOLD = 8
 # Under gravity, what meets more slowly than by a fall from this fraction of its inscribed radius comes to rest: its
 # bounces, if not ended, would be infinitely many in finite time, and are lower than can be seen.  It rebounds in full
 # to the end of the stretch of time, and rests from then on (see impacts/resting.py).
-RESTING_DROP = 1e-3
+RESTITUTION_THRESHOLD_HEIGHT = 1e-3
 
 # Faces and edges inclined by less than this [sine of the angle] rest on each other along a patch: about what a face
-# is inclined by when one of its edges lies and the other is a few RESTING_DROP away.
-RESTING_TILT = 1e-2
+# is inclined by when one of its edges lies and the other is a few RESTITUTION_THRESHOLD_HEIGHT away.
+RESTING_PARALLEL_TOLERANCE = 1e-2
 
 # Whether a particle is in no cluster of what comes to rest, settles with one, or does and may still meet others of it
 # as if it did not (see impacts/cluster.py).
@@ -54,8 +54,8 @@ MAX_SLOW_IMPACTS = 100
 
 # Times that islands are joined within one stretch of time before it is tried in two halves, and how often it is
 # halved before it is taken as it is: islands with more impacts than that then stand still until its end.
-MAX_ROUNDS = 40
-MAX_HALVINGS = 5
+MAX_ISLAND_ROUNDS = 40
+MAX_SUBSTEP_BISECTIONS = 5
 
 # Impacts of the same particles that are apart by less than this fraction of a stretch of time happen at once: some
 # digits above the rounding of times, and the way made meanwhile is less than 1e-10 of a size.
@@ -73,12 +73,12 @@ IMPACT_TOLERANCE = 1e-12
 
 # Bodies that touch and part, or hardly move, may sink into each other by this fraction of their sizes before they
 # count as meeting again: it bounds the number of impacts between two that roll over each other or lie still.
-SINKING = 4e-7
+PENETRATION_SLOP = 4e-7
 
 # The same where gravity brings things to rest: few impacts pass between a jolt and the next rest.
-RESTING_SINKING = 1e-5
+RESTING_PENETRATION_SLOP = 1e-5
 
 # A particle may get this fraction of its radius away from where it was when its neighbours were looked up, and half
 # as far again as it flies in one stretch of time, before they are looked up anew. Longer leashes make longer lists,
 # which take time in every stretch and memory; shorter ones must be made more often.
-LEASH = 0.6
+VERLET_SKIN = 0.6

@@ -1,15 +1,17 @@
 """The one decorator under which every kernel is compiled, and the cache in which the result is kept.
 
-Numba's on-disk cache notices a change in the file of a kernel but not in the files of the kernels that it calls.
-The cache folder is therefore named after a digest of all kernel sources: a stale kernel cannot be run, and a
-package installed read-only still has a cache.
+Numba's on-disk cache notices a change in the file of a kernel but not in the files of the kernels that it calls. The
+cache folder of a module is therefore named after a digest of its source and of all that it imports: a stale kernel
+cannot be run, what a change does not concern is not compiled again, and a package installed read-only has a cache.
 """
 
 from __future__ import annotations
 
+import functools
 import getpass
 import hashlib
 import os
+import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -22,21 +24,36 @@ from numba.extending import intrinsic, models, register_model
 from numba.np.arrayobj import make_array
 
 _PACKAGE = Path(__file__).parent.parent
+_IMPORT = re.compile(rb"^\s*from particlesim\.([\w.]+) import", re.MULTILINE)
 
 
-def _source_digest() -> str:
-    digest = hashlib.sha256()
-    for path in sorted(_PACKAGE.rglob("*.py")):
-        source = path.read_bytes()
-        if b"@kernel" in source or path.name in ("constants.py", "jit.py"):
-            digest.update(source)
-    return digest.hexdigest()[:16]
+@functools.cache
+def _source(module: str) -> bytes:
+    """The source of a module of this package, named from below it; empty if there is none."""
+    path = _PACKAGE.joinpath(*module.split("."))
+    path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    return path.read_bytes() if path.is_file() else b""
+
+
+@functools.cache
+def _digest(module: str) -> str:
+    """A digest of a module and of all that it imports from this package, directly or not."""
+    found, waiting = set(), [module]
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += [match.decode() for match in _IMPORT.findall(_source(name))]
+    sources = hashlib.sha256(_source("core.jit"))
+    for name in sorted(found):
+        sources.update(_source(name))
+    return sources.hexdigest()[:16]
 
 
 def _cache_folder() -> str:
     """The folder for compiled kernels: NUMBA_CACHE_DIR if set, else the user's cache, else a temporary folder."""
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    folder = Path(base) / "particlesim" / f"kernels-{_source_digest()}"
+    folder = Path(base) / "particlesim" / "kernels"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -50,6 +67,11 @@ def _cache_folder() -> str:
 CACHE_FOLDER = _cache_folder()
 
 
+def is_compiled(module: str) -> bool:
+    """Whether there are compiled kernels of a module of this package, named from below it, as it is now."""
+    return any(Path(CACHE_FOLDER, _digest(module)).rglob("*.nbi"))
+
+
 def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False) -> Any:
     """Compile ``function`` for the machine: cached on disk, without the GIL, IEEE arithmetic (no fastmath).
 
@@ -61,10 +83,11 @@ def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False) 
     # The place of a function's cache is settled when it is decorated; other users of numba keep theirs.
     config: Any = numba.config
     elsewhere = config.CACHE_DIR
-    config.CACHE_DIR = CACHE_FOLDER
+    ours = function.__module__.startswith("particlesim.")
+    config.CACHE_DIR = os.path.join(CACHE_FOLDER, _digest(function.__module__.removeprefix("particlesim.")))
     try:
         options: dict[str, Any] = {"inline": "always" if inline else "never", "error_model": "numpy"}
-        return numba.njit(cache=True, nogil=True, **options)(function)
+        return numba.njit(cache=ours, nogil=True, **options)(function)
     finally:
         config.CACHE_DIR = elsewhere
 
@@ -139,4 +162,4 @@ _config: Any = numba.config
 # from here on. Counting is atomic: handing a struct of arrays to a function takes longer than moving a particle, and
 # threads that count the same arrays wait for each other. The caller of the kernel holds the arrays meanwhile; neither
 # they nor parts of them may be returned.
-borrowed: Any = _same if _config.DISABLE_JIT else intrinsic(_borrow)
+without_refcounts: Any = _same if _config.DISABLE_JIT else intrinsic(_borrow)

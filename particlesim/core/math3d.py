@@ -12,25 +12,25 @@ from particlesim.core.jit import kernel
 
 
 @kernel
-def row(array, index):
+def load_vec3(array, index):
     """Vector number ``index`` of an (n, 3) array."""
     return array[index, 0], array[index, 1], array[index, 2]
 
 
 @kernel
-def vector(array):
+def to_vec3(array):
     """A (3,) array as a vector."""
     return array[0], array[1], array[2]
 
 
 @kernel
-def row4(array, index):
+def load_quat(array, index):
     """Quaternion number ``index`` of an (n, 4) array."""
     return array[index, 0], array[index, 1], array[index, 2], array[index, 3]
 
 
 @kernel
-def put(array, index, v):
+def store_vec3(array, index, v):
     """Write vector ``v`` as row ``index`` of an (n, 3) array."""
     array[index, 0] = v[0]
     array[index, 1] = v[1]
@@ -38,7 +38,7 @@ def put(array, index, v):
 
 
 @kernel
-def put4(array, index, q):
+def store_quat(array, index, q):
     """Write quaternion ``q`` as row ``index`` of an (n, 4) array."""
     array[index, 0] = q[0]
     array[index, 1] = q[1]
@@ -47,7 +47,7 @@ def put4(array, index, q):
 
 
 @kernel
-def grown(array):
+def grow(array):
     """An array with the rows of this one and room for as many again."""
     longer = np.empty((2 * array.shape[0], array.shape[1]), dtype=array.dtype)
     for k in range(array.shape[0]):
@@ -69,13 +69,13 @@ def sub(a, b):
 
 
 @kernel
-def scaled(a, factor):
+def scale(a, factor):
     """factor * a"""
     return a[0] * factor, a[1] * factor, a[2] * factor
 
 
 @kernel
-def along(a, b, factor):
+def axpy(a, b, factor):
     """a + factor * b"""
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
@@ -99,7 +99,7 @@ def norm(a):
 
 
 @kernel
-def quaternion_product(p, q):
+def quat_multiply(p, q):
     """The rotation q followed by the rotation p."""
     return (
         p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
@@ -116,14 +116,14 @@ def conjugate(q):
 
 
 @kernel
-def unit_quaternion(q):
+def quat_normalize(q):
     """q divided by its length."""
     s = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     return q[0] * s, q[1] * s, q[2] * s, q[3] * s
 
 
 @kernel
-def quaternion_of(rotation_vector):
+def quat_from_rotvec(rotation_vector):
     """Quaternion of the rotation by |rotation_vector| [rad] about its direction."""
     angle = norm(rotation_vector)
     # Below 1e-4 the series of sin(x/2)/x is exact to the last bit.
@@ -143,18 +143,18 @@ def rotate(q, v):
     Divided by |q|^2: a quaternion is of unit length only to rounding, which would stretch v a little each time.
     """
     length2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
-    t = scaled(cross((q[1], q[2], q[3]), v), 2.0 / length2)
-    return along(add(v, cross((q[1], q[2], q[3]), t)), t, q[0])
+    t = scale(cross((q[1], q[2], q[3]), v), 2.0 / length2)
+    return axpy(add(v, cross((q[1], q[2], q[3]), t)), t, q[0])
 
 
 @kernel
-def rotate_back(q, v):
+def inverse_rotate(q, v):
     """Vector v in world axes, seen in body axes."""
     return rotate(conjugate(q), v)
 
 
 @kernel
-def matrix_of(q):
+def quat_to_matrix(q):
     """Rotation matrix of a unit quaternion, nine numbers by rows."""
     w, x, y, z = q
     return (
@@ -171,7 +171,7 @@ def matrix_of(q):
 
 
 @kernel
-def apply(m, v):
+def mat_vec(m, v):
     """Matrix m times vector v."""
     return (
         m[0] * v[0] + m[1] * v[1] + m[2] * v[2],
@@ -181,7 +181,7 @@ def apply(m, v):
 
 
 @kernel
-def apply_transposed(m, v):
+def mat_transposed_vec(m, v):
     """The transpose of matrix m times vector v."""
     return (
         m[0] * v[0] + m[3] * v[1] + m[6] * v[2],

@@ -54,7 +54,7 @@ def _pool_of(threads: int) -> ThreadPoolExecutor | None:
     return _pools[threads]
 
 
-class Crew:
+class ThreadTeam:
     """The threads (see ``use_threads``) for one task over ``count`` items."""
 
     def __init__(self, count: int) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from particlesim.core.jit import borrowed, kernel
-from particlesim.core.math3d import dot, norm, put, put4, row, row4, sub, vector
+from particlesim.core.jit import kernel, without_refcounts
+from particlesim.core.math3d import dot, load_quat, load_vec3, norm, store_quat, store_vec3, sub, to_vec3
 from particlesim.geometry.narrow_phase.pair import nearest_image
 from particlesim.model.free_motion import free_path, spin_rate
 
@@ -24,21 +24,21 @@ def fly_on(constants, state, world, clock, acceleration, anchor, leash, duration
     Particles that leave a periodic world come back on the other side. Returns for how long [s] all of them certainly
     stay on their leashes, going straight on; -1 if one is not on its leash now.
     """
-    constants, state, world = borrowed((constants, state, world))
-    clock, acceleration, anchor, leash = borrowed((clock, acceleration, anchor, leash))
+    constants, state, world = without_refcounts((constants, state, world))
+    clock, acceleration, anchor, leash = without_refcounts((clock, acceleration, anchor, leash))
     position, orientation, velocity = state.position, state.orientation, state.velocity
     momentum, image, inertia = state.angular_momentum, state.image, constants.inertia
     corner, period = world.lower, world.period
-    gravity = norm(vector(world.gravity))
+    gravity = norm(to_vec3(world.gravity))
     longest = math.inf
     for i in range(first, last):
-        pull = row(acceleration, i)
+        pull = load_vec3(acceleration, i)
         x, q, v = free_path(
-            row(position, i),
-            row4(orientation, i),
-            row(velocity, i),
-            row(momentum, i),
-            row(inertia, i),
+            load_vec3(position, i),
+            load_quat(orientation, i),
+            load_vec3(velocity, i),
+            load_vec3(momentum, i),
+            load_vec3(inertia, i),
             pull,
             duration - clock[i],
         )
@@ -51,10 +51,10 @@ def fly_on(constants, state, world, clock, acceleration, anchor, leash, duration
             for axis in range(3):
                 image[i, axis] += turns[axis]
             x = x[0] - period[0] * turns[0], x[1] - period[1] * turns[1], x[2] - period[2] * turns[2]
-        put(position, i, x)
-        put4(orientation, i, q)
-        put(velocity, i, v)
-        room = leash[i] - norm(nearest_image(sub(x, row(anchor, i)), period))
+        store_vec3(position, i, x)
+        store_quat(orientation, i, q)
+        store_vec3(velocity, i, v)
+        room = leash[i] - norm(nearest_image(sub(x, load_vec3(anchor, i)), period))
         if room < 0.0:
             longest = -1.0
         else:
@@ -72,20 +72,20 @@ def paces(constants, state, world, out, rows, first, last):
 
     ``out`` (blocks, 2) [1/s^2], [1/s^2]. Returns the largest speed [m/s].
     """
-    velocity, orientation, momentum, inertia, radius = borrowed(
+    velocity, orientation, momentum, inertia, radius = without_refcounts(
         (state.velocity, state.orientation, state.angular_momentum, constants.inertia, constants.radius)
     )
-    g = norm(vector(world.gravity))
+    g = norm(to_vec3(world.gravity))
     fastest = 0.0
     for block in range(first, last):
         pace = pull = 0.0
         for i in range(block * rows, min((block + 1) * rows, len(radius))):
-            speed2 = dot(row(velocity, i), row(velocity, i))
-            own = row(momentum, i)
+            speed2 = dot(load_vec3(velocity, i), load_vec3(velocity, i))
+            own = load_vec3(momentum, i)
             fastest = max(fastest, speed2)
             speed = math.sqrt(speed2)
             if dot(own, own) > 0.0:
-                speed += spin_rate(row4(orientation, i), own, row(inertia, i)) * radius[i]
+                speed += spin_rate(load_quat(orientation, i), own, load_vec3(inertia, i)) * radius[i]
             pace += (speed / radius[i]) ** 2
             pull += g / radius[i]
         out[block, 0], out[block, 1] = pace, pull

@@ -18,10 +18,10 @@ import numpy as np
 from particlesim.broad_phase.aabb_statistics import survey
 from particlesim.broad_phase.morton import LEVELS, codes_of
 from particlesim.broad_phase.octree_build import sort_by_code
-from particlesim.core.constants import LEASH
+from particlesim.core.constants import VERLET_SKIN
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import norm, row
-from particlesim.core.parallel import Crew
+from particlesim.core.math3d import load_vec3, norm
+from particlesim.core.parallel import ThreadTeam
 
 FindPairs = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, int]]
 
@@ -61,7 +61,7 @@ def places_of(position: np.ndarray, period: np.ndarray) -> Places:
     count = len(position)
     particle = np.arange(count, dtype=np.int32)
     if count:
-        crew = Crew(count)
+        crew = ThreadTeam(count)
         seen = survey(position, position, period, crew)
         edge = float((seen.region_upper - seen.region_lower).max())
         codes = codes_of(position, position, period, seen, 1.0 / edge if edge > 1e-300 else 0.0, crew)
@@ -171,7 +171,9 @@ def _candidate_pairs(
     """Pairs of places whose boxes, of half widths ``reach`` (n,), overlap, and the number of boxes compared."""
     count = len(reach)
     lower, upper = np.empty((count, 3)), np.empty((count, 3))
-    Crew(count).each(lambda _, first, last: _boxes(position, reach, places.particle, lower, upper, first, last), count)
+    ThreadTeam(count).each(
+        lambda _, first, last: _boxes(position, reach, places.particle, lower, upper, first, last), count
+    )
     return find_pairs(lower, upper, period)
 
 
@@ -181,7 +183,7 @@ def _later_neighbours(
     """Of the candidate pairs those whose spheres of radius ``reach`` overlap, as ``later_start`` and ``later``."""
     sphere = np.column_stack((position, reach))[places.particle]
     later_start = np.zeros(len(reach) + 1, dtype=np.int64)
-    parts = Crew(len(pairs)).each(
+    parts = ThreadTeam(len(pairs)).each(
         lambda _, first, last: _later(pairs, sphere, period, later_start, first, last), len(pairs)
     )
     return later_start.cumsum(), np.concatenate(parts)
@@ -217,7 +219,7 @@ def in_order(neighbours: Neighbours) -> None:
     """Put the neighbours of each particle in the order of their numbers."""
     particle, _, start, other = neighbours.lists
     count = len(particle)
-    Crew(count).each(lambda _, first, last: _sort_rows(particle, start, other, first, last), count)
+    ThreadTeam(count).each(lambda _, first, last: _sort_rows(particle, start, other, first, last), count)
 
 
 def pairs_of(neighbours: Neighbours) -> np.ndarray:
@@ -232,5 +234,5 @@ def pairs_of(neighbours: Neighbours) -> np.ndarray:
 def leashes(radius, velocity, acceleration, duration, leash, first, last):
     """How long leashes must be for a path of ``duration``, straight or deflected, and a while after."""
     for i in range(first, last):
-        way = (norm(row(velocity, i)) + norm(row(acceleration, i)) * duration) * duration
-        leash[i] = LEASH * radius[i] + 1.5 * way
+        way = (norm(load_vec3(velocity, i)) + norm(load_vec3(acceleration, i)) * duration) * duration
+        leash[i] = VERLET_SKIN * radius[i] + 1.5 * way

@@ -17,8 +17,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from particlesim.core.constants import LONGEST_STRETCH, MAX_HALVINGS, MAX_MANIFOLD, MAX_ROUNDS, SPHERE, WALL
-from particlesim.core.parallel import Crew
+from particlesim.core.constants import (
+    MAX_ISLAND_ROUNDS,
+    MAX_MANIFOLD,
+    MAX_SUBSTEP_BISECTIONS,
+    MAX_SUBSTEP_DISPLACEMENT,
+    SPHERE,
+    WALL,
+)
+from particlesim.core.parallel import ThreadTeam
 from particlesim.dynamics.advance import fly_on, paces
 from particlesim.dynamics.contact.impact import IMPACTS, TALLY, VIRIAL, WALLS
 from particlesim.dynamics.contact.resting import Resting
@@ -95,7 +102,7 @@ class Flight:
         if not count:
             return math.inf
         sums = np.empty((-(-count // _ROWS), 2))
-        of_blocks = Crew(count).each(
+        of_blocks = ThreadTeam(count).each(
             lambda _, first, last: paces(self._constants, self._state, self._world, sums, _ROWS, first, last), len(sums)
         )
         fastest = max(of_blocks)
@@ -113,7 +120,7 @@ class Flight:
 
     def advance(self, duration: float) -> None:
         """Move all on by ``duration`` [s], in as many equal stretches as that is long."""
-        parts = max(1, math.ceil(duration / self.longest_stretch(LONGEST_STRETCH) - 1e-9))
+        parts = max(1, math.ceil(duration / self.longest_stretch(MAX_SUBSTEP_DISPLACEMENT) - 1e-9))
         for _ in range(parts):
             self._stretch(duration / parts)
 
@@ -128,7 +135,7 @@ class Flight:
             with self._spent_on("pairs"):
                 del self._neighbours  # which take as much memory as what it takes to make new ones
                 self._look_around(duration)
-        if not self._follow(duration, halvings == MAX_HALVINGS):
+        if not self._follow(duration, halvings == MAX_SUBSTEP_BISECTIONS):
             # Too much hangs together, or happens: less does in half the time.
             self._stretch(0.5 * duration, halvings + 1)
             self._stretch(0.5 * duration, halvings + 1)
@@ -148,7 +155,7 @@ class Flight:
         touched = [newly_touched(course.touched, met)]
         linked = met
         rounds = unfinished = 0
-        while len(linked) and (anyhow or (rounds < MAX_ROUNDS and not unfinished)):
+        while len(linked) and (anyhow or (rounds < MAX_ISLAND_ROUNDS and not unfinished)):
             with self._spent_on("respond"):
                 islands = unite(course, linked)
                 rewind(course, log, state, islands.member)
@@ -182,7 +189,7 @@ class Flight:
         where = self._where(log)[:-1]
         neighbours, count = self._neighbours, len(islands.start) - 1
         meetings = met, times, self._first_met, islands.start, islands.member
-        crew = Crew(_ISLAND * count)
+        crew = ThreadTeam(_ISLAND * count)
         parts = crew.each(
             lambda _, first, last: run_islands(
                 *where, neighbours.lists, *meetings, duration, self._tally, np.empty((MAX_MANIFOLD, 3)), first, last
@@ -227,7 +234,7 @@ class Flight:
         """Bring everyone to the end of the stretch."""
         course, neighbours = self._course, self._neighbours
         count = len(self._constants.mass)
-        crew = Crew(count)
+        crew = ThreadTeam(count)
         times = crew.each(
             lambda _, first, last: fly_on(
                 self._constants, self._state, self._world, course.clock, course.acceleration,
@@ -240,7 +247,7 @@ class Flight:
     def _look_around(self, duration: float) -> None:
         """Find the neighbours of all, with leashes for a stretch of ``duration``."""
         count = len(self._constants.mass)
-        crew = Crew(count)
+        crew = ThreadTeam(count)
         crew.each(
             lambda _, first, last: leashes(
                 self._constants.radius, self._state.velocity, self._course.acceleration, duration,

@@ -4,17 +4,17 @@ import math
 
 from particlesim.core.constants import SPHERE
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import apply, matrix_of, row
+from particlesim.core.math3d import load_vec3, mat_vec, quat_to_matrix
 
 
 @kernel
 def hull_extent(vertices, first, last, size, turn):
     """Lower and upper corner of a hull's box, relative to its centroid, in world axes."""
-    matrix = matrix_of(turn)
+    matrix = quat_to_matrix(turn)
     x0 = y0 = z0 = math.inf
     x1 = y1 = z1 = -math.inf
     for v in range(first, last):
-        x, y, z = apply(matrix, row(vertices, v))
+        x, y, z = mat_vec(matrix, load_vec3(vertices, v))
         x0, y0, z0 = min(x0, x), min(y0, y), min(z0, z)
         x1, y1, z1 = max(x1, x), max(y1, y), max(z1, z)
     return (x0 * size, y0 * size, z0 * size), (x1 * size, y1 * size, z1 * size)

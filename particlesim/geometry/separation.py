@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from particlesim.core.constants import MAX_MANIFOLD
-from particlesim.core.math3d import quaternion_product, unit_quaternion
+from particlesim.core.math3d import quat_multiply, quat_normalize
 from particlesim.geometry.narrow_phase.pair import pair_contact
 from particlesim.geometry.shape_table import stack_shapes
 from particlesim.geometry.shapes import CATALOGUE, Shape
@@ -98,5 +98,5 @@ def _checked(pose: Any) -> tuple[np.ndarray, np.ndarray, float]:
 
 def _of_body_axes(turn: np.ndarray, shape: Shape) -> tuple[float, ...]:
     """The orientation of a shape's body axes when ``turn`` is that of the axes it was described in."""
-    product = quaternion_product(tuple(turn.tolist()), tuple(shape.orientation.tolist()))
-    return tuple(unit_quaternion(product))
+    product = quat_multiply(tuple(turn.tolist()), tuple(shape.orientation.tolist()))
+    return tuple(quat_normalize(product))

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from particlesim.core.jit import CACHE_FOLDER
+from particlesim.core.jit import is_compiled
 from particlesim.scene import Scene
 from particlesim.scene.file import parse_scene
 from particlesim.simulation.simulation import Simulation
@@ -81,7 +81,7 @@ def scene_of(trajectory: Trajectory) -> Scene:
 
 def start(scene: Scene, threads: int | None, progress: Progress | None) -> Simulation:
     """The simulation of a scene, its kernels compiled. SceneError if it cannot be built."""
-    if not any(Path(CACHE_FOLDER).rglob("*.nbi")):
+    if not is_compiled("dynamics.events.event_queue"):
         tell(progress, "compiling, this once", 0, scene.frames)
         _compile(scene)
     tell(progress, "preparing", 0, scene.frames)

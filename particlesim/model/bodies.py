@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.core.constants import SINKING
+from particlesim.core.constants import PENETRATION_SLOP
 from particlesim.geometry.shapes import Shape
 
 
@@ -68,7 +68,7 @@ class World(NamedTuple):
     gravity: np.ndarray  # (3,) [m/s^2]
     restitution: float  # of the walls
     still: float = 0.0  # speed below which nothing counts as approaching [m/s]
-    sinking: float = SINKING  # how deep touches may go before they count again, as a fraction of sizes
+    sinking: float = PENETRATION_SLOP  # how deep touches may go before they count again, as a fraction of sizes
 
 
 def particle_constants(

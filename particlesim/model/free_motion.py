@@ -10,19 +10,19 @@ import numpy as np
 
 from particlesim.core.jit import kernel
 from particlesim.core.math3d import (
-    along,
+    axpy,
     cross,
     dot,
+    inverse_rotate,
+    load_quat,
+    load_vec3,
     norm,
-    put,
-    quaternion_of,
-    quaternion_product,
+    quat_from_rotvec,
+    quat_multiply,
+    quat_normalize,
     rotate,
-    rotate_back,
-    row,
-    row4,
-    scaled,
-    unit_quaternion,
+    scale,
+    store_vec3,
 )
 
 # Moments of inertia closer than this fraction of each other are equal: the body is a symmetric top.
@@ -62,7 +62,7 @@ def _unique_axis(moments):
 @kernel
 def spin_of(turn, momentum, moments):
     """Angular velocity of a body with the given angular momentum about its centroid, both in world axes."""
-    body = rotate_back(turn, momentum)
+    body = inverse_rotate(turn, momentum)
     return rotate(turn, (body[0] / moments[0], body[1] / moments[1], body[2] / moments[2]))
 
 
@@ -77,7 +77,9 @@ def spin_rate(turn, momentum, moments):
 @kernel
 def particle_spin(constants, state, i):
     """Angular velocity of particle ``i``, world axes [rad/s]."""
-    return spin_of(row4(state.orientation, i), row(state.angular_momentum, i), row(constants.inertia, i))
+    return spin_of(
+        load_quat(state.orientation, i), load_vec3(state.angular_momentum, i), load_vec3(constants.inertia, i)
+    )
 
 
 @kernel
@@ -85,7 +87,7 @@ def spins(constants, state):
     """Angular velocities of all particles, (n, 3), world axes [rad/s]."""
     out = np.empty_like(state.angular_momentum)
     for i in range(len(out)):
-        put(out, i, particle_spin(constants, state, i))
+        store_vec3(out, i, particle_spin(constants, state, i))
     return out
 
 
@@ -97,22 +99,22 @@ def _symmetric_top(turn, momentum, moments, axis, time):
     steady (L. D. Landau, E. M. Lifshitz, Mechanics, 3rd ed., section 33).
     """
     across = moments[0] if axis != 0 else moments[1]
-    body = rotate_back(turn, momentum)
+    body = inverse_rotate(turn, momentum)
     spin = (1.0 / moments[axis] - 1.0 / across) * body[axis] * time
     about_axis = (
         spin if axis == 0 else 0.0,
         spin if axis == 1 else 0.0,
         spin if axis == 2 else 0.0,
     )
-    turn = quaternion_product(turn, quaternion_of(about_axis))
-    return unit_quaternion(quaternion_product(quaternion_of(scaled(momentum, time / across)), turn))
+    turn = quat_multiply(turn, quat_from_rotvec(about_axis))
+    return quat_normalize(quat_multiply(quat_from_rotvec(scale(momentum, time / across)), turn))
 
 
 @kernel
 def _rates(q, m, inverse):
     """Time derivatives of the orientation and of the angular momentum in body axes (Euler's equations)."""
     spin = (m[0] * inverse[0], m[1] * inverse[1], m[2] * inverse[2])
-    half = quaternion_product(q, (0.0, 0.5 * spin[0], 0.5 * spin[1], 0.5 * spin[2]))
+    half = quat_multiply(q, (0.0, 0.5 * spin[0], 0.5 * spin[1], 0.5 * spin[2]))
     return half, cross(m, spin)
 
 
@@ -123,7 +125,7 @@ def _stage(q, m, rates_q, rates_m, weights, time):
         w = weights[k] * time
         r = rates_q[k]
         q = (q[0] + w * r[0], q[1] + w * r[1], q[2] + w * r[2], q[3] + w * r[3])
-        m = along(m, rates_m[k], w)
+        m = axpy(m, rates_m[k], w)
     return q, m
 
 
@@ -142,27 +144,27 @@ def _asymmetric_turn(turn, body_momentum, moments, time):
         qa, ma = _rates(qa, ma, inverse)
         qb, mb = _rates(qb, mb, inverse)
         qc, mc = _rates(qc, mc, inverse)
-        change = norm(along(ma, rates_m[0], -1.0)) + norm(along(mc, rates_m[2], -1.0))
+        change = norm(axpy(ma, rates_m[0], -1.0)) + norm(axpy(mc, rates_m[2], -1.0))
         change_q = abs(qc[0] - rates_q[2][0]) + abs(qc[1] - rates_q[2][1]) + abs(qc[2] - rates_q[2][2])
         rates_q, rates_m = (qa, qb, qc), (ma, mb, mc)
         if change * norm(body_momentum) <= limit and change_q * time <= 1e-16:
             break
     turn, body_momentum = _stage(turn, body_momentum, rates_q, rates_m, _WEIGHTS, time)
-    return unit_quaternion(turn), body_momentum
+    return quat_normalize(turn), body_momentum
 
 
 @kernel
 def _asymmetric_top(turn, momentum, moments, time):
     """Orientation of a body with three different moments after ``time``."""
-    body = rotate_back(turn, momentum)
+    body = inverse_rotate(turn, momentum)
     fastest = norm(momentum) / min(moments[0], moments[1], moments[2])
     parts = max(1, math.ceil(fastest * abs(time) / _MAX_TURN))
     for _ in range(parts):
         turn, body = _asymmetric_turn(turn, body, moments, time / parts)
     # The quadrature keeps the energy and the length of the momentum; this nudge keeps its direction in space.
     drifted = rotate(turn, body)
-    nudge = quaternion_of(scaled(cross(drifted, momentum), 1.0 / dot(momentum, momentum)))
-    return unit_quaternion(quaternion_product(nudge, turn))
+    nudge = quat_from_rotvec(scale(cross(drifted, momentum), 1.0 / dot(momentum, momentum)))
+    return quat_normalize(quat_multiply(nudge, turn))
 
 
 @kernel
@@ -175,8 +177,8 @@ def free_rotation(turn, momentum, moments, time):
         return turn
     axis = _unique_axis(moments)
     if axis == 3:
-        step = quaternion_of(scaled(momentum, time / moments[0]))
-        return unit_quaternion(quaternion_product(step, turn))
+        step = quat_from_rotvec(scale(momentum, time / moments[0]))
+        return quat_normalize(quat_multiply(step, turn))
     if axis >= 0:
         return _symmetric_top(turn, momentum, moments, axis, time)
     return _asymmetric_top(turn, momentum, moments, time)
@@ -185,5 +187,5 @@ def free_rotation(turn, momentum, moments, time):
 @kernel
 def free_path(position, turn, velocity, momentum, moments, gravity, time):
     """Position, orientation and velocity of a particle after ``time`` [s] of either sign."""
-    position = along(along(position, velocity, time), gravity, 0.5 * time * time)
-    return position, free_rotation(turn, momentum, moments, time), along(velocity, gravity, time)
+    position = axpy(axpy(position, velocity, time), gravity, 0.5 * time * time)
+    return position, free_rotation(turn, momentum, moments, time), axpy(velocity, gravity, time)

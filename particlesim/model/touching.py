@@ -6,8 +6,8 @@ import numpy as np
 
 from particlesim.core.constants import MAX_MANIFOLD, WALL
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import dot, row, row4, sub
-from particlesim.core.parallel import Crew
+from particlesim.core.math3d import dot, load_quat, load_vec3, sub
+from particlesim.core.parallel import ThreadTeam
 from particlesim.geometry.narrow_phase.half_space import wall_contact, wall_normal
 from particlesim.geometry.narrow_phase.pair import nearest_image, pair_contact, pair_overlaps
 from particlesim.geometry.shape_table import ShapeTable
@@ -32,7 +32,7 @@ def contact_now(table, world, constants, state, i, j, points):
 
     The normal and the offset point from i to j, points are relative to i's centroid; a wall has offset 0.
     """
-    position, turn = row(state.position, i), row4(state.orientation, i)
+    position, turn = load_vec3(state.position, i), load_quat(state.orientation, i)
     if j < 0:
         wall = wall_of_partner(j)
         separation, count = wall_contact(
@@ -40,7 +40,7 @@ def contact_now(table, world, constants, state, i, j, points):
         )
         normal, offset = wall_normal(wall), (0.0, 0.0, 0.0)
     else:
-        offset = nearest_image(sub(row(state.position, j), position), world.period)
+        offset = nearest_image(sub(load_vec3(state.position, j), position), world.period)
         separation, normal, count = pair_contact(
             table,
             constants.shape[i],
@@ -48,7 +48,7 @@ def contact_now(table, world, constants, state, i, j, points):
             turn,
             constants.shape[j],
             constants.size[j],
-            row4(state.orientation, j),
+            load_quat(state.orientation, j),
             offset,
             points,
         )
@@ -65,17 +65,17 @@ def _mark_touching(table, world, constants, state, pairs, touches, first, last):
     for k in range(first, last):
         i, j = pairs[k, 0], pairs[k, 1]
         touches[k] = False
-        offset = nearest_image(sub(row(position, j), row(position, i)), period)
+        offset = nearest_image(sub(load_vec3(position, j), load_vec3(position, i)), period)
         reach = radius[i] + radius[j]
         if dot(offset, offset) <= reach * reach:
             touches[k] = pair_overlaps(
                 table,
                 shape[i],
                 size[i],
-                row4(orientation, i),
+                load_quat(orientation, i),
                 shape[j],
                 size[j],
-                row4(orientation, j),
+                load_quat(orientation, j),
                 offset,
                 points,
             )
@@ -86,7 +86,7 @@ def touching_pairs(
 ) -> np.ndarray:
     """The candidate pairs (m, 2) that touch or overlap, in the order of ``pairs``."""
     touches = np.empty(len(pairs), dtype=np.bool_)
-    crew = Crew(len(pairs))
+    crew = ThreadTeam(len(pairs))
     crew.each(
         lambda _, first, last: _mark_touching(table, world, constants, state, pairs, touches, first, last),
         len(pairs),
@@ -113,11 +113,11 @@ def touching_walls(table, world, constants, state):
     found = np.empty((64, 2), dtype=np.int64)
     count = 0
     for i in range(len(radius)):
-        where = row(position, i)
+        where = load_vec3(position, i)
         for wall in range(6):
             if not _near_wall(lower, upper, boundary, where, radius[i], wall):
                 continue
-            turn = row4(orientation, i)
+            turn = load_quat(orientation, i)
             separation, _ = wall_contact(table, world, wall, shape[i], size[i], turn, where, points)
             if separation <= 0.0:
                 if count == len(found):

@@ -15,9 +15,9 @@ from particlesim.core.constants import (
     APPROACH_TOLERANCE,
     MAX_MANIFOLD,
     OPEN,
+    PENETRATION_SLOP,
     PERIODIC,
-    RESTING_SINKING,
-    SINKING,
+    RESTING_PENETRATION_SLOP,
     WALL,
     WALL_NAMES,
 )
@@ -88,7 +88,7 @@ def build_world(scene: Scene) -> World:
         restitution=float(scene.world.restitution),
         # The same fraction of the speed of a fall through the world.
         still=APPROACH_TOLERANCE * float(np.sqrt(2.0 * np.abs(gravity) @ scene.world.size)),
-        sinking=RESTING_SINKING if gravity.any() and loses else SINKING,
+        sinking=RESTING_PENETRATION_SLOP if gravity.any() and loses else PENETRATION_SLOP,
     )
 
 

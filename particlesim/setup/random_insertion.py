@@ -9,7 +9,7 @@ import numpy as np
 
 from particlesim.core.constants import MAX_MANIFOLD, SPHERE
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import dot, put, row, row4, sub
+from particlesim.core.math3d import dot, load_quat, load_vec3, store_vec3, sub
 from particlesim.geometry.aabb import particle_extent
 from particlesim.geometry.narrow_phase.pair import nearest_image, pair_overlaps
 from particlesim.geometry.shape_table import ShapeTable
@@ -58,9 +58,9 @@ def empty_space(constants: Constants, world: World, total: int) -> Placed:
 def _write_extents(table, shape, size, orientation, below, above):
     kind, vertices, start = table.kind, table.vertex, table.vertex_start
     for i in range(len(shape)):
-        lower, upper = particle_extent(kind, vertices, start, shape[i], size[i], row4(orientation, i))
-        put(below, i, lower)
-        put(above, i, upper)
+        lower, upper = particle_extent(kind, vertices, start, shape[i], size[i], load_quat(orientation, i))
+        store_vec3(below, i, lower)
+        store_vec3(above, i, upper)
 
 
 @kernel
@@ -112,7 +112,9 @@ def put_in_place(world, placed, who):
     """Count the particles of ``who`` (m,) as in place where they stand in ``placed``."""
     lower, upper, period, cells = world.lower, world.upper, world.period, placed.cells
     for i in who:
-        bucket = _bucket_at(lower, upper, period, cells, placed.level[i], row(placed.position, i), len(placed.head))
+        bucket = _bucket_at(
+            lower, upper, period, cells, placed.level[i], load_vec3(placed.position, i), len(placed.head)
+        )
         placed.behind[i] = placed.head[bucket]
         placed.head[bucket] = i
 
@@ -132,12 +134,12 @@ def _meets_any(
         for cell in range(wide * deep * (z1 - z0 + 1) + 1):
             j = head[bucket]
             while j >= 0:
-                offset = nearest_image(sub(row(position, j), point), period)
+                offset = nearest_image(sub(load_vec3(position, j), point), period)
                 reach = radius[i] + radius[j]
                 if dot(offset, offset) <= reach * reach:
                     if kind[shape[i]] == SPHERE and kind[shape[j]] == SPHERE:
                         return True
-                    turn, other = row4(orientation, i), row4(orientation, j)
+                    turn, other = load_quat(orientation, i), load_quat(orientation, j)
                     if pair_overlaps(table, shape[i], size[i], turn, shape[j], size[j], other, offset, points):
                         return True
                 j = behind[j]
@@ -166,7 +168,7 @@ def try_in_place(table, world, constants, placed, who, proposals):
                 table, kind, shape, size, radius, lower, upper, period,
                 position, orientation, head, behind, cells, i, point, points,
             ):  # fmt: skip
-                put(position, i, point)
+                store_vec3(position, i, point)
                 bucket = _bucket_at(lower, upper, period, cells, level[i], point, len(head))
                 behind[i] = head[bucket]
                 head[bucket] = i

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import add, along, cross, dot, put, row, scaled, vector
+from particlesim.core.math3d import add, axpy, cross, dot, load_vec3, scale, store_vec3, to_vec3
 from particlesim.model.free_motion import particle_spin
 
 
@@ -55,14 +55,14 @@ def sums(world, constants, state):
     """Rows (3, 3): energies of translation, of rotation and in the field; momentum; angular momentum."""
     translational = rotational = potential = 0.0
     momentum = angular = (0.0, 0.0, 0.0)
-    gravity = vector(world.gravity)
+    gravity = to_vec3(world.gravity)
     # Gravity times the corner of the world that it points to.
     lowest = 0.0
     for axis in range(3):
         lowest += max(gravity[axis] * world.lower[axis], gravity[axis] * world.upper[axis])
     for i in range(len(constants.mass)):
-        m, v, x = constants.mass[i], row(state.velocity, i), row(state.position, i)
-        own = row(state.angular_momentum, i)
+        m, v, x = constants.mass[i], load_vec3(state.velocity, i), load_vec3(state.position, i)
+        own = load_vec3(state.angular_momentum, i)
         # Where the particle would be had it not been brought back into a periodic world.
         x = (
             x[0] + state.image[i, 0] * world.period[0],
@@ -72,10 +72,10 @@ def sums(world, constants, state):
         translational += 0.5 * m * dot(v, v)
         rotational += 0.5 * dot(own, particle_spin(constants, state, i))
         potential += m * (lowest - dot(gravity, x))
-        momentum = along(momentum, v, m)
-        angular = add(angular, add(own, scaled(cross(x, v), m)))
+        momentum = axpy(momentum, v, m)
+        angular = add(angular, add(own, scale(cross(x, v), m)))
     out = np.empty((3, 3))
-    put(out, 0, (translational, rotational, potential))
-    put(out, 1, momentum)
-    put(out, 2, angular)
+    store_vec3(out, 0, (translational, rotational, potential))
+    store_vec3(out, 1, momentum)
+    store_vec3(out, 2, angular)
     return out

@@ -18,7 +18,7 @@ from typing import Any
 import gsd.hoomd
 import numpy as np
 
-from particlesim.core.atomic_write import appearing
+from particlesim.core.atomic_write import atomic_write
 from particlesim.core.constants import SPHERE
 from particlesim.geometry.shapes import Shape, hull, sphere
 
@@ -86,7 +86,7 @@ class TrajectoryWriter:
         self._header = header
         self._types, self._type_of = _display_types(header)
         self._files = contextlib.ExitStack()
-        hidden = self._files.enter_context(appearing(path))
+        hidden = self._files.enter_context(atomic_write(path))
         self._file = self._files.enter_context(gsd.hoomd.open(str(hidden), "w"))
         self._count = 0
 

@@ -10,7 +10,7 @@ import numpy as np
 from particlesim.benchmarks.broad_phase.measure import machine_words
 from particlesim.benchmarks.broad_phase.runs import SceneComparison
 from particlesim.benchmarks.broad_phase.sweep import Sweep
-from particlesim.core.atomic_write import appearing
+from particlesim.core.atomic_write import atomic_write
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -86,7 +86,7 @@ def _save(figure: Figure, path: Path) -> list[Path]:
     for suffix, metadata in ((".svg", {"Date": None}), (".png", {})):
         with (
             rc_context({"svg.fonttype": "none", "svg.hashsalt": "particlesim"}),
-            appearing(path.with_suffix(suffix)) as hidden,
+            atomic_write(path.with_suffix(suffix)) as hidden,
         ):
             figure.savefig(hidden, dpi=110, metadata=metadata)
         written.append(path.with_suffix(suffix))

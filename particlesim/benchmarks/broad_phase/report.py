@@ -12,7 +12,7 @@ from particlesim.benchmarks.broad_phase.figure import draw_scene, draw_sweep
 from particlesim.benchmarks.broad_phase.runs import Frames, SceneComparison
 from particlesim.benchmarks.broad_phase.stream import Stream, write_stream
 from particlesim.benchmarks.broad_phase.sweep import Sweep
-from particlesim.core.atomic_write import appearing
+from particlesim.core.atomic_write import atomic_write
 
 
 def write_scene(comparison: SceneComparison, path: Path) -> list[Path]:
@@ -33,6 +33,6 @@ def write_frames(frames: Frames, world_size: tuple[float, float, float], name: s
 
 
 def _write_json(table: dict[str, Any], path: Path) -> Path:
-    with appearing(path) as hidden:
+    with atomic_write(path) as hidden:
         hidden.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
     return path

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.core.atomic_write import appearing
+from particlesim.core.atomic_write import atomic_write
 
 _HEADER = np.dtype(
     [
@@ -71,7 +71,7 @@ def write_stream(path: str | Path, stream: Stream) -> None:
     header = np.zeros(1, dtype=_HEADER)
     header["scene"], header["objects"], header["count"], header["frames"] = *names, count, frames
     header["world"] = _padded(stream.world[:1], stream.world[1:], path)
-    with appearing(path) as hidden, hidden.open("wb") as file:
+    with atomic_write(path) as hidden, hidden.open("wb") as file:
         file.write(header.tobytes())
         for lower, upper in stream.frames():
             file.write(_padded(lower, upper, path).tobytes())

@@ -8,7 +8,7 @@ normal that turns with the features that face each other keeps them level, and l
 import math
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import add, along, cross, dot, norm, rotate, rotate_back, row, scaled, sub
+from particlesim.core.math3d import add, axpy, cross, dot, inverse_rotate, load_vec3, norm, rotate, scale, sub
 
 # Ways that a normal may go: it stands, turns with the first body, with the second, or with an edge of each.
 STANDING = 0
@@ -26,13 +26,13 @@ def farthest(vertex, first, last, direction, change, time):
     """How far vertices ``first .. last`` reach along ``direction + time * change``, and how fast this grows."""
     if first == last:
         return 0.0, 0.0
-    towards = along(direction, change, time)
+    towards = axpy(direction, change, time)
     most, corner = -math.inf, first
     for v in range(first, last):
-        reach = dot(row(vertex, v), towards)
+        reach = dot(load_vec3(vertex, v), towards)
         if reach > most:
             most, corner = reach, v
-    return most, dot(row(vertex, corner), change)
+    return most, dot(load_vec3(vertex, corner), change)
 
 
 @kernel
@@ -76,14 +76,14 @@ def facing_edge(vertex, first, last, direction):
     best = second = first
     reach = nearly = hardly = -math.inf
     for v in range(first, last):
-        r = dot(row(vertex, v), direction)
+        r = dot(load_vec3(vertex, v), direction)
         if r > reach:
             best, second, reach, nearly, hardly = v, best, r, reach, nearly
         elif r > nearly:
             second, nearly, hardly = v, r, nearly
         else:
             hardly = max(hardly, r)
-    edge = sub(row(vertex, second), row(vertex, best)) if first < last else (0.0, 0.0, 0.0)
+    edge = sub(load_vec3(vertex, second), load_vec3(vertex, best)) if first < last else (0.0, 0.0, 0.0)
     return edge, reach - nearly, reach - hardly
 
 
@@ -97,7 +97,7 @@ def turning_with_edges(edge_i, with_i, edge_j, with_j, normal):
     area = dot(edge_i, across_j)
     turning = (0.0, 0.0, 0.0)
     if area != 0.0:
-        turning = along(scaled(across_j, dot(with_i, edge_i) / area), across_i, dot(with_j, edge_j) / area)
+        turning = axpy(scale(across_j, dot(with_i, edge_i) / area), across_i, dot(with_j, edge_j) / area)
     return turning
 
 
@@ -113,14 +113,14 @@ def step_of_turning(
     """
     size_i, turn_i, spin_i = body_i
     size_j, turn_j, spin_j = body_j
-    back, turning_back = scaled(normal, -1.0), scaled(turning, -1.0)
+    back, turning_back = scale(normal, -1.0), scale(turning, -1.0)
     way_i = (
-        scaled(rotate_back(turn_i, normal), size_i),
-        scaled(rotate_back(turn_i, add(turning, cross(normal, spin_i))), size_i),
+        scale(inverse_rotate(turn_i, normal), size_i),
+        scale(inverse_rotate(turn_i, add(turning, cross(normal, spin_i))), size_i),
     )
     way_j = (
-        scaled(rotate_back(turn_j, back), size_j),
-        scaled(rotate_back(turn_j, add(turning_back, cross(back, spin_j))), size_j),
+        scale(inverse_rotate(turn_j, back), size_j),
+        scale(inverse_rotate(turn_j, add(turning_back, cross(back, spin_j))), size_j),
     )
     rate = norm(turning)
     # Along a turning normal n, corners a vector s apart bend by n'' . s + 2 n' . s' + n . s''.
@@ -137,8 +137,8 @@ def _turning_of(way, vertex, range_i, body_i, range_j, body_j, normal):
     with_i, with_j = cross(body_i[2], normal), cross(body_j[2], normal)
     if way != _WITH_EDGES:
         return with_i if way == _WITH_FIRST else with_j
-    edge_i, _, _ = facing_edge(vertex, range_i[0], range_i[1], rotate_back(body_i[1], normal))
-    edge_j, _, _ = facing_edge(vertex, range_j[0], range_j[1], rotate_back(body_j[1], scaled(normal, -1.0)))
+    edge_i, _, _ = facing_edge(vertex, range_i[0], range_i[1], inverse_rotate(body_i[1], normal))
+    edge_j, _, _ = facing_edge(vertex, range_j[0], range_j[1], inverse_rotate(body_j[1], scale(normal, -1.0)))
     return turning_with_edges(rotate(body_i[1], edge_i), with_i, rotate(body_j[1], edge_j), with_j, normal)
 
 

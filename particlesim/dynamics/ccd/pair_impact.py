@@ -4,7 +4,7 @@ import math
 
 from particlesim.core.constants import APPROACH_TOLERANCE, IMPACT_TOLERANCE, SPHERE, WALL
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import add, cross, dot, norm, row, scaled, sub
+from particlesim.core.math3d import add, cross, dot, load_vec3, norm, scale, sub
 from particlesim.dynamics.ccd.time_of_impact import (
     first_touch,
     most_closing,
@@ -68,10 +68,10 @@ def _touches(table, world, body_i, path_i, body_j, path_j, wall, points):
     at_once = _speed_at_depth(sinking, norm(pull))
     approaching, leaving = False, True
     for k in range(count if touching else 0):
-        of_i = velocity_at(path_i, body_i[3], row(points, k))
+        of_i = velocity_at(path_i, body_i[3], load_vec3(points, k))
         parting, speed = -dot(of_i, normal), norm(of_i)
         if wall < 0:
-            of_j = velocity_at(path_j, body_j[3], sub(row(points, k), offset))
+            of_j = velocity_at(path_j, body_j[3], sub(load_vec3(points, k), offset))
             parting += dot(of_j, normal)
             speed += norm(of_j)
         none = APPROACH_TOLERANCE * speed + world.still
@@ -106,7 +106,7 @@ def _hull_meets(table, world, body_i, path_i, body_j, path_j, wall, start, end, 
 @kernel(inline=True)
 def body_of(constants, i):
     """Shape, size, radius and moments of particle ``i``."""
-    return constants.shape[i], constants.size[i], constants.radius[i], row(constants.inertia, i)
+    return constants.shape[i], constants.size[i], constants.radius[i], load_vec3(constants.inertia, i)
 
 
 @kernel(inline=True)
@@ -116,8 +116,8 @@ def _spheres_meet(body_i, path_i, body_j, path_j, offset, still, duration):
     reach = body_i[2] + body_j[2]
     time = spheres_meet(offset, velocity, reach, duration)
     if time == 0.0:
-        of_i = velocity_at(path_i, body_i[3], scaled(offset, body_i[2] / reach))
-        of_j = velocity_at(path_j, body_j[3], scaled(offset, -body_j[2] / reach))
+        of_i = velocity_at(path_i, body_i[3], scale(offset, body_i[2] / reach))
+        of_j = velocity_at(path_j, body_j[3], scale(offset, -body_j[2] / reach))
         tolerance = APPROACH_TOLERANCE * (norm(of_i) + norm(of_j)) + still
         if dot(offset, velocity) >= -tolerance * norm(offset):
             time = math.inf
@@ -147,7 +147,7 @@ def pair_meets(table, world, kind_i, body_i, path_i, kind_j, body_j, path_j, dur
 def _sphere_meets_wall(body, path, normal, room, speed, acceleration, still, sinking, duration):
     """When a sphere meets a wall; if it touches it and hardly moves, when it has sunk into it a little."""
     if room <= IMPACT_TOLERANCE * body[1]:
-        surface = velocity_at(path, body[3], scaled(normal, body[2]))
+        surface = velocity_at(path, body[3], scale(normal, body[2]))
         none = APPROACH_TOLERANCE * norm(surface) + still
         if -none - _speed_at_depth(sinking, max(acceleration, 0.0)) <= speed <= none:
             room = max(0.25 * sinking, sinking + room)

@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from particlesim.core.constants import SETTLES, SPHERE, WALL
-from particlesim.core.jit import borrowed, kernel
-from particlesim.core.math3d import dot, norm, row, sub
+from particlesim.core.jit import kernel, without_refcounts
+from particlesim.core.math3d import dot, load_vec3, norm, sub
 from particlesim.dynamics.ccd.time_of_impact import sphere_meets_wall, spheres_meet
 from particlesim.dynamics.neighbour_list import around_of, far_apart
 from particlesim.geometry.narrow_phase.pair import nearest_image
@@ -32,18 +32,18 @@ def balls(radius, position, velocity, acceleration, place, duration, ball, first
 
     Position, radius of the ball, velocity, radius of the particle. Returns whether all accelerate as particle 0 does.
     """
-    radius, position, velocity, acceleration = borrowed((radius, position, velocity, acceleration))
-    place, ball = borrowed((place, ball))
-    pull = row(acceleration, 0)
+    radius, position, velocity, acceleration = without_refcounts((radius, position, velocity, acceleration))
+    place, ball = without_refcounts((place, ball))
+    pull = load_vec3(acceleration, 0)
     alike = True
     for i in range(first, last):
         p = place[i]
-        own = row(acceleration, i)
+        own = load_vec3(acceleration, i)
         alike = alike and own[0] == pull[0] and own[1] == pull[1] and own[2] == pull[2]
         for axis in range(3):
             ball[p, axis] = position[i, axis]
             ball[p, 4 + axis] = velocity[i, axis]
-        ball[p, 3] = radius[i] + free_way(row(velocity, i), own, duration)
+        ball[p, 3] = radius[i] + free_way(load_vec3(velocity, i), own, duration)
         ball[p, 7] = radius[i]
     return alike
 
@@ -60,7 +60,7 @@ def _list(found, slots, times, count, i, j, slot, time):
 @kernel
 def _pair_time(spheres, ball, p, q, period, duration):
     """When the particles at two places meet that accelerate alike; -1 where that must be looked into."""
-    offset = nearest_image(sub(row(ball, q), row(ball, p)), period)
+    offset = nearest_image(sub(load_vec3(ball, q), load_vec3(ball, p)), period)
     velocity = ball[q, 4] - ball[p, 4], ball[q, 5] - ball[p, 5], ball[q, 6] - ball[p, 6]
     reach = ball[p, 7] + ball[q, 7]
     time = spheres_meet(offset, velocity, reach, duration)
@@ -79,8 +79,8 @@ def sieve(
     together and more must be known. Where not all are known to accelerate ``alike``, it is looked at for each pair.
     What settles together (see cluster.py) is not looked at.
     """
-    kind, shape, acceleration, ball, particle = borrowed((kind, shape, acceleration, ball, particle))
-    standing, later_start, later, period = borrowed((standing, later_start, later, period))
+    kind, shape, acceleration, ball, particle = without_refcounts((kind, shape, acceleration, ball, particle))
+    standing, later_start, later, period = without_refcounts((standing, later_start, later, period))
     around = around_of(period)
     most = later_start[last] - later_start[first]
     found, slots = np.empty((most, 2), dtype=np.int64), np.empty(most, dtype=np.int64)
@@ -95,7 +95,7 @@ def sieve(
             i, j = particle[one], particle[two]
             if standing[i] == SETTLES and standing[j] == SETTLES:
                 continue
-            pull = sub(row(acceleration, j), row(acceleration, i)) if not alike else (0.0, 0.0, 0.0)
+            pull = sub(load_vec3(acceleration, j), load_vec3(acceleration, i)) if not alike else (0.0, 0.0, 0.0)
             time = -1.0
             if pull[0] == 0.0 and pull[1] == 0.0 and pull[2] == 0.0:
                 spheres = kind[shape[i]] == SPHERE and kind[shape[j]] == SPHERE
@@ -110,10 +110,10 @@ def sieve_walls(
     kind, shape, radius, position, velocity, acceleration, standing, lower, upper, boundary, duration, first, last
 ):  # fmt: skip
     """As ``sieve``, of particles ``first .. last`` with walls, which are partners below 0 and stand nowhere: -1."""
-    kind, shape, radius, position, velocity, acceleration = borrowed(
+    kind, shape, radius, position, velocity, acceleration = without_refcounts(
         (kind, shape, radius, position, velocity, acceleration)
     )
-    standing = borrowed(standing)
+    standing = without_refcounts(standing)
     most = 6 * (last - first)
     found, slots = np.empty((most, 2), dtype=np.int64), np.empty(most, dtype=np.int64)
     times = np.empty(most)
@@ -121,7 +121,7 @@ def sieve_walls(
     for i in range(first, last):
         if standing[i] == SETTLES:
             continue
-        x, v, a = row(position, i), row(velocity, i), row(acceleration, i)
+        x, v, a = load_vec3(position, i), load_vec3(velocity, i), load_vec3(acceleration, i)
         way = free_way(v, a, duration)
         for wall in range(6):
             axis = wall // 2

@@ -16,7 +16,7 @@ import math
 
 from particlesim.core.constants import IMPACT_TOLERANCE, SPHERE
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import along, dot, norm, rotate_back, scaled, sub
+from particlesim.core.math3d import axpy, dot, inverse_rotate, norm, scale, sub
 from particlesim.dynamics.ccd.conservative_advancement import (
     ANY_WAY,
     STANDING,
@@ -123,7 +123,7 @@ def most_closing(body_i, path_i, body_j, path_j, duration):
 def _place(kind, body, path, time):
     """Position, orientation and angular velocity at ``time``; those of a sphere's rotation do not matter."""
     position, turn, velocity, momentum, acceleration = path
-    position = along(along(position, velocity, time), acceleration, 0.5 * time * time)
+    position = axpy(axpy(position, velocity, time), acceleration, 0.5 * time * time)
     spin = (0.0, 0.0, 0.0)
     if kind != SPHERE:
         turn = free_rotation(turn, momentum, body[3], time)
@@ -164,10 +164,10 @@ def stays_apart(table, body_i, path_i, body_j, path_j, offset, normal, duration)
     nothing = (0.0, 0.0, 0.0)
     reach_i, reach_j = body_i[2], body_j[2]
     if kind_i != SPHERE:
-        way = scaled(rotate_back(path_i[1], normal), body_i[1])
+        way = scale(inverse_rotate(path_i[1], normal), body_i[1])
         reach_i, _ = farthest(vertex, range_i[0], range_i[1], way, nothing, 0.0)
     if kind_j != SPHERE:
-        way = scaled(rotate_back(path_j[1], normal), -body_j[1])
+        way = scale(inverse_rotate(path_j[1], normal), -body_j[1])
         reach_j, _ = farthest(vertex, range_j[0], range_j[1], way, nothing, 0.0)
     # What nearly touches is left to the search, which knows whether that is an impact.
     gap = dot(offset, normal) - reach_i - reach_j - 2.0 * IMPACT_TOLERANCE * (body_i[1] + body_j[1])
@@ -205,7 +205,7 @@ def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wal
     turning = _fastest_corner(body_i, path_i)
     if wall >= 0:
         range_j, sizes, radii = (0, 0), body_i[1], body_i[2]
-        velocity, acceleration = scaled(path_i[2], -1.0), scaled(path_i[4], -1.0)
+        velocity, acceleration = scale(path_i[2], -1.0), scale(path_i[4], -1.0)
     else:
         turning += _fastest_corner(body_j, path_j)
     way = norm(velocity) + norm(acceleration) * end
@@ -227,7 +227,7 @@ def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wal
         if gap <= IMPACT_TOLERANCE * sizes:
             return time
         left = end - time
-        now = along(velocity, acceleration, time)
+        now = axpy(velocity, acceleration, time)
         # Most are so far apart that not even their fastest corners close the gap.
         closing = turning + max(0.0, -dot(now, normal)) + norm(acceleration) * left
         if gap - IMPACT_TOLERANCE * sizes > closing * left:

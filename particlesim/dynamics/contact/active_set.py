@@ -8,9 +8,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from particlesim.core.constants import FREE, LOOSE, MAX_MANIFOLD, RESTING_DROP, SETTLES, STILL, WALL
-from particlesim.core.jit import borrowed, kernel
-from particlesim.core.math3d import conjugate, dot, grown, norm, put, put4, quaternion_product, row, row4, sub, vector
+from particlesim.core.constants import FREE, LOOSE, MAX_MANIFOLD, RESTITUTION_THRESHOLD_HEIGHT, SETTLES, STILL, WALL
+from particlesim.core.jit import kernel, without_refcounts
+from particlesim.core.math3d import (
+    conjugate,
+    dot,
+    grow,
+    load_quat,
+    load_vec3,
+    norm,
+    quat_multiply,
+    store_quat,
+    store_vec3,
+    sub,
+    to_vec3,
+)
 from particlesim.dynamics.contact.contact_points import COLUMNS, GAP, INRADIUS, PARTING, RESTITUTION, SLOW, add_contact
 from particlesim.geometry.narrow_phase.half_space import wall_normal
 from particlesim.geometry.narrow_phase.pair import nearest_image
@@ -25,7 +37,7 @@ _HANDED_ON = 0.3
 def _rests(point, first, last):
     """Whether partners hardly move against each other at one of these contact points, and touch there."""
     for k in range(first, last):
-        near = RESTING_DROP * point[k, INRADIUS] * (STILL if point[k, RESTITUTION] == 1.0 else 1.0)
+        near = RESTITUTION_THRESHOLD_HEIGHT * point[k, INRADIUS] * (STILL if point[k, RESTITUTION] == 1.0 else 1.0)
         if point[k, GAP] <= near and abs(point[k, PARTING]) <= point[k, SLOW]:
             return True
     return False
@@ -34,7 +46,7 @@ def _rests(point, first, last):
 @kernel
 def _pressed(world, wall):
     """Whether gravity presses against a wall."""
-    return world.boundary[wall // 2] == WALL and dot(wall_normal(wall), vector(world.gravity)) > 0.0
+    return world.boundary[wall // 2] == WALL and dot(wall_normal(wall), to_vec3(world.gravity)) > 0.0
 
 
 @kernel
@@ -42,7 +54,7 @@ def surface_paces(constants, state, spin):
     """How fast the surface of each particle moves at most, (n,) [m/s]."""
     pace = np.empty(len(constants.radius))
     for i in range(len(pace)):
-        pace[i] = norm(row(state.velocity, i)) + norm(row(spin, i)) * constants.radius[i]
+        pace[i] = norm(load_vec3(state.velocity, i)) + norm(load_vec3(spin, i)) * constants.radius[i]
     return pace
 
 
@@ -66,14 +78,14 @@ def walk(constants, state, period, position, orientation, way):
 
     These become the present ones.
     """
-    constants, state, period = borrowed((constants, state, period))
+    constants, state, period = without_refcounts((constants, state, period))
     for i in range(len(way)):
-        x, q = row(state.position, i), row4(state.orientation, i)
-        half = quaternion_product(q, conjugate(row4(orientation, i)))
+        x, q = load_vec3(state.position, i), load_quat(state.orientation, i)
+        half = quat_multiply(q, conjugate(load_quat(orientation, i)))
         turn = 2.0 * constants.radius[i] * norm((half[1], half[2], half[3]))
-        way[i] += norm(nearest_image(sub(x, row(position, i)), period)) + turn
-        put(position, i, x)
-        put4(orientation, i, q)
+        way[i] += norm(nearest_image(sub(x, load_vec3(position, i)), period)) + turn
+        store_vec3(position, i, x)
+        store_quat(orientation, i, q)
 
 
 @kernel
@@ -84,9 +96,9 @@ def find_cluster(table, world, constants, state, spin, lists, duration, pace, wa
     beside ``lists.other`` is how far apart neighbours were at least, with the ways they had come then, and is kept
     up to date. Fills in the ``standing`` (n,) of each particle: FREE, SETTLES or LOOSE.
     """
-    table, world, constants, state = borrowed((table, world, constants, state))
-    spin, lists, pace, standing = borrowed((spin, lists, pace, standing))
-    way, clearance = borrowed((way, clearance))
+    table, world, constants, state = without_refcounts((table, world, constants, state))
+    spin, lists, pace, standing = without_refcounts((spin, lists, pace, standing))
+    way, clearance = without_refcounts((way, clearance))
     start, other = lists.start, lists.other
     position, radius = state.position, constants.radius
     count = len(radius)
@@ -102,7 +114,7 @@ def find_cluster(table, world, constants, state, spin, lists, duration, pace, wa
                 continue
             axis = wall // 2
             room = world.upper[axis] - position[i, axis] if wall % 2 else position[i, axis] - world.lower[axis]
-            if room <= radius[i] * (1.0 + RESTING_DROP):
+            if room <= radius[i] * (1.0 + RESTITUTION_THRESHOLD_HEIGHT):
                 j = wall_as_partner(wall)
                 last, _, _ = add_contact(
                     table, world, constants, state, spin, pace, duration, i, j, -np.inf, points, gaps, partner, point, 0
@@ -118,7 +130,7 @@ def find_cluster(table, world, constants, state, spin, lists, duration, pace, wa
         gathered[i] = True
         place = lists.place[i]
         while size + MAX_MANIFOLD * (6 + start[place + 1] - start[place]) > len(partner):
-            partner, point = grown(partner), grown(point)
+            partner, point = grow(partner), grow(point)
         for wall in range(6):
             if world.boundary[wall // 2] == WALL:
                 j = wall_as_partner(wall)

@@ -8,9 +8,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from particlesim.core.constants import FREE, HULL, LOOSE, MAX_MANIFOLD, RESTING_DROP, RESTING_TILT, SETTLES, STILL
+from particlesim.core.constants import (
+    FREE,
+    HULL,
+    LOOSE,
+    MAX_MANIFOLD,
+    RESTING_PARALLEL_TOLERANCE,
+    RESTITUTION_THRESHOLD_HEIGHT,
+    SETTLES,
+    STILL,
+)
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import apply, cross, dot, matrix_of, norm, put, row, row4, scaled, sub
+from particlesim.core.math3d import (
+    cross,
+    dot,
+    load_quat,
+    load_vec3,
+    mat_vec,
+    norm,
+    quat_to_matrix,
+    scale,
+    store_vec3,
+    sub,
+)
 from particlesim.dynamics.contact.curvature_margin import bend
 from particlesim.dynamics.contact.impact import restitution_of
 from particlesim.geometry.narrow_phase.contact_manifold import hull_patch
@@ -60,14 +80,14 @@ def _wall_points(table, world, constants, state, i, wall, reach, points, gaps):
     count = 0
     if table.kind[shape] != HULL:
         if room - constants.radius[i] <= reach:
-            put(points, 0, scaled(normal, constants.radius[i]))
+            store_vec3(points, 0, scale(normal, constants.radius[i]))
             gaps[0] = room - constants.radius[i]
             count = 1
     elif room - constants.radius[i] <= reach:
-        matrix = matrix_of(row4(state.orientation, i))
+        matrix = quat_to_matrix(load_quat(state.orientation, i))
         vertex = table.vertex
         for v in range(table.vertex_start[shape], table.vertex_start[shape + 1]):
-            corner = apply(matrix, scaled(row(vertex, v), size))
+            corner = mat_vec(matrix, scale(load_vec3(vertex, v), size))
             gap = room - dot(normal, corner)
             if gap > reach:
                 continue
@@ -80,7 +100,7 @@ def _wall_points(table, world, constants, state, i, wall, reach, points, gaps):
                     continue
             else:
                 count += 1
-            put(points, slot, corner)
+            store_vec3(points, slot, corner)
             gaps[slot] = gap
     return normal, (0.0, 0.0, 0.0), count
 
@@ -94,7 +114,7 @@ def _with_nearest(points, gaps, count, nearest, gap, tolerance):
     if least <= gap + tolerance:
         return count
     slot = min(count, MAX_MANIFOLD - 1)
-    put(points, slot, nearest)
+    store_vec3(points, slot, nearest)
     gaps[slot] = gap
     return slot + 1
 
@@ -102,15 +122,15 @@ def _with_nearest(points, gaps, count, nearest, gap, tolerance):
 @kernel
 def _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps):
     """Contact points of two particles within ``reach``, and the gaps there: (normal, offset, how many, least gap)."""
-    offset = nearest_image(sub(row(state.position, j), row(state.position, i)), world.period)
+    offset = nearest_image(sub(load_vec3(state.position, j), load_vec3(state.position, i)), world.period)
     gap = norm(offset) - constants.radius[i] - constants.radius[j]
     normal, count = (0.0, 0.0, 0.0), 0
     if gap > reach:
         return normal, offset, count, gap
-    shape_i, size_i, turn_i = constants.shape[i], constants.size[i], row4(state.orientation, i)
-    shape_j, size_j, turn_j = constants.shape[j], constants.size[j], row4(state.orientation, j)
+    shape_i, size_i, turn_i = constants.shape[i], constants.size[i], load_quat(state.orientation, i)
+    shape_j, size_j, turn_j = constants.shape[j], constants.size[j], load_quat(state.orientation, j)
     if table.kind[shape_i] == HULL and table.kind[shape_j] == HULL:
-        matrix_i, matrix_j = matrix_of(turn_i), matrix_of(turn_j)
+        matrix_i, matrix_j = quat_to_matrix(turn_i), quat_to_matrix(turn_j)
         border = _BORDER * min(constants.inradius[i], constants.inradius[j])
         gap, normal, middle, _ = hull_separation(
             table, shape_i, size_i, matrix_i, shape_j, size_j, matrix_j, offset, NO_CORNERS
@@ -120,7 +140,7 @@ def _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps
                 table, shape_i, size_i, matrix_i, shape_j, size_j, matrix_j,
                 offset, normal, gap, middle, tilt, min(reach, border), points, gaps,
             )  # fmt: skip
-            count = _with_nearest(points, gaps, count, middle, gap, RESTING_DROP * border)
+            count = _with_nearest(points, gaps, count, middle, gap, RESTITUTION_THRESHOLD_HEIGHT * border)
     else:
         gap, normal, count = pair_contact(table, shape_i, size_i, turn_i, shape_j, size_j, turn_j, offset, points)
         gaps[0] = gap
@@ -131,9 +151,9 @@ def _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps
 def parting_at(velocity, spin, i, j, point, k):
     """How fast particle ``i`` and partner ``j`` part at contact point ``k`` at these velocities and spins [m/s]."""
     normal = column(point, k, NORMAL)
-    parting = -dot(normal, row(velocity, i)) - dot(column(point, k, LEVER_I), row(spin, i))
+    parting = -dot(normal, load_vec3(velocity, i)) - dot(column(point, k, LEVER_I), load_vec3(spin, i))
     if j >= 0:
-        parting += dot(normal, row(velocity, j)) + dot(column(point, k, LEVER_J), row(spin, j))
+        parting += dot(normal, load_vec3(velocity, j)) + dot(column(point, k, LEVER_J), load_vec3(spin, j))
     return parting
 
 
@@ -143,7 +163,7 @@ def write_point(constants, state, i, j, normal, offset, arm, inradius, restituti
     partner[m, 0], partner[m, 1] = i, j
     _put_column(point, m, NORMAL, normal)
     lever = cross(arm, normal)
-    twist = spin_of(row4(state.orientation, i), lever, row(constants.inertia, i))
+    twist = spin_of(load_quat(state.orientation, i), lever, load_vec3(constants.inertia, i))
     _put_column(point, m, LEVER_I, lever)
     _put_column(point, m, TWIST_I, twist)
     _put_column(point, m, LEVER_J, (0.0, 0.0, 0.0))
@@ -151,7 +171,7 @@ def write_point(constants, state, i, j, normal, offset, arm, inradius, restituti
     inverse_mass = 1.0 / constants.mass[i] + dot(lever, twist)
     if j >= 0:
         lever = cross(sub(arm, offset), normal)
-        twist = spin_of(row4(state.orientation, j), lever, row(constants.inertia, j))
+        twist = spin_of(load_quat(state.orientation, j), lever, load_vec3(constants.inertia, j))
         _put_column(point, m, LEVER_J, lever)
         _put_column(point, m, TWIST_J, twist)
         inverse_mass += 1.0 / constants.mass[j] + dot(lever, twist)
@@ -177,10 +197,10 @@ def add_contact(table, world, constants, state, spin, pace, duration, i, j, clea
     lossless = restitution == 1.0
     way = FASTER * speed * duration
     # A corner that is turned by so much comes down on a face within the stretch.
-    tilt = RESTING_TILT if lossless else min(max(RESTING_TILT, way / inradius), _MOST_TILT)
-    reach = RESTING_DROP * inradius + way
+    tilt = RESTING_PARALLEL_TOLERANCE if lossless else min(max(RESTING_PARALLEL_TOLERANCE, way / inradius), _MOST_TILT)
+    reach = RESTITUTION_THRESHOLD_HEIGHT * inradius + way
     if lossless:
-        slow, reach = STILL * slow, STILL * RESTING_DROP * inradius
+        slow, reach = STILL * slow, STILL * RESTITUTION_THRESHOLD_HEIGHT * inradius
     what = LOOSE if lossless else SETTLES
     if clear > reach:
         return size, LOOSE if lossless else FREE, clear
@@ -190,7 +210,7 @@ def add_contact(table, world, constants, state, spin, pace, duration, i, j, clea
         normal, offset, count, clear = _pair_points(table, world, constants, state, i, j, reach, tilt, points, gaps)
     for k in range(count):
         m = size + k
-        arm = row(points, k)
+        arm = load_vec3(points, k)
         write_point(constants, state, i, j, normal, offset, arm, inradius, restitution, slow, m, partner, point)
         parting = parting_at(state.velocity, spin, i, j, point, m)
         if lossless and abs(parting) > slow:
@@ -211,7 +231,7 @@ def handed_down(point, order, first, last, lever, force):
     for k in range(len(force)):
         nearest, least = -1, np.inf
         for place in range(first[k], last[k]):
-            way = sub(column(point, order[place], LEVER_I), row(lever, k))
+            way = sub(column(point, order[place], LEVER_I), load_vec3(lever, k))
             if dot(way, way) < least:
                 nearest, least = order[place], dot(way, way)
         if nearest >= 0:

@@ -8,7 +8,19 @@ turns the faster the more nearly parallel they are.
 
 from particlesim.core.constants import HULL
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import add, along, cross, dot, norm, rotate, rotate_back, row, row4, scaled, sub
+from particlesim.core.math3d import (
+    add,
+    axpy,
+    cross,
+    dot,
+    inverse_rotate,
+    load_quat,
+    load_vec3,
+    norm,
+    rotate,
+    scale,
+    sub,
+)
 from particlesim.dynamics.ccd.conservative_advancement import facing_edge, turning_with_edges
 
 _STILL = (0.0, 0.0, 0.0)
@@ -21,16 +33,16 @@ _LEVEL = 1e-6
 def _edge_facing(table, shape, turn, direction):
     """The edge of a hull that faces ``direction``, in world axes; (0, 0, 0) if a corner or a face does."""
     first, last = table.vertex_start[shape], table.vertex_start[shape + 1]
-    edge, lag, next_lag = facing_edge(table.vertex, first, last, rotate_back(turn, direction))
+    edge, lag, next_lag = facing_edge(table.vertex, first, last, inverse_rotate(turn, direction))
     return rotate(turn, edge) if lag <= _LEVEL < next_lag else _STILL
 
 
 @kernel
 def _turning_of_edges(table, constants, state, spin, i, j, normal):
     """How fast the normal of two hulls turns whose edges cross [1/s]; 0 if it is not edges that face each other."""
-    edge_i = _edge_facing(table, constants.shape[i], row4(state.orientation, i), normal)
-    edge_j = _edge_facing(table, constants.shape[j], row4(state.orientation, j), scaled(normal, -1.0))
-    with_i, with_j = cross(row(spin, i), normal), cross(row(spin, j), normal)
+    edge_i = _edge_facing(table, constants.shape[i], load_quat(state.orientation, i), normal)
+    edge_j = _edge_facing(table, constants.shape[j], load_quat(state.orientation, j), scale(normal, -1.0))
+    with_i, with_j = cross(load_vec3(spin, i), normal), cross(load_vec3(spin, j), normal)
     return norm(turning_with_edges(edge_i, with_i, edge_j, with_j, normal))
 
 
@@ -47,18 +59,18 @@ def bend(table, constants, state, spin, i, j, normal, offset, arm, duration):
     The ``normal`` points from i to j, the point is at ``arm`` from the centroid of i, that of j at ``offset``.
     """
     hull_i = table.kind[constants.shape[i]] == HULL
-    spin_i = row(spin, i) if hull_i else _STILL
+    spin_i = load_vec3(spin, i) if hull_i else _STILL
     if j < 0:
         return 0.5 * max(_bending(spin_i, arm, normal), 0.0) * duration * duration
     hull_j = table.kind[constants.shape[j]] == HULL
-    spin_j = row(spin, j) if hull_j else _STILL
+    spin_j = load_vec3(spin, j) if hull_j else _STILL
     # A sphere may turn as it likes: it is its centre that comes near.
     arm_i = arm if hull_j else offset
-    arm_j = sub(arm, offset) if hull_i else scaled(offset, -1.0)
-    of_i = add(row(state.velocity, i), cross(spin_i, arm_i))
-    of_j = add(row(state.velocity, j), cross(spin_j, arm_j))
+    arm_j = sub(arm, offset) if hull_i else scale(offset, -1.0)
+    of_i = add(load_vec3(state.velocity, i), cross(spin_i, arm_i))
+    of_j = add(load_vec3(state.velocity, j), cross(spin_j, arm_j))
     sliding = sub(of_j, of_i)
-    across = norm(along(sliding, normal, -dot(sliding, normal)))
+    across = norm(axpy(sliding, normal, -dot(sliding, normal)))
     turning = max(norm(cross(normal, spin_i)), norm(cross(normal, spin_j)))
     if hull_i and hull_j:
         turning = max(turning, _turning_of_edges(table, constants, state, spin, i, j, normal))

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.core.constants import FREE, MAX_MANIFOLD, SPHERE
-from particlesim.core.jit import borrowed, kernel
-from particlesim.core.math3d import add, grown, norm, put, put4, row, row4, scaled, sub
+from particlesim.core.jit import kernel, without_refcounts
+from particlesim.core.math3d import add, grow, load_quat, load_vec3, norm, scale, store_quat, store_vec3, sub
 from particlesim.dynamics.contact.contact_points import (
     BEND,
     COLUMNS,
@@ -44,22 +44,23 @@ def fly(constants, state, acceleration, standing, duration, ahead):
         if standing[i] == FREE:
             continue
         position, turn, velocity = free_path(
-            row(state.position, i), row4(state.orientation, i), row(state.velocity, i), row(state.angular_momentum, i),
-            row(constants.inertia, i), row(acceleration, i), duration,
+            load_vec3(state.position, i), load_quat(state.orientation, i), load_vec3(state.velocity, i),
+            load_vec3(state.angular_momentum, i), load_vec3(constants.inertia, i),
+            load_vec3(acceleration, i), duration,
         )  # fmt: skip
-        put(ahead.position, i, position)
-        put4(ahead.orientation, i, turn)
-        put(ahead.velocity, i, velocity)
+        store_vec3(ahead.position, i, position)
+        store_quat(ahead.orientation, i, turn)
+        store_vec3(ahead.velocity, i, velocity)
 
 
 @kernel
 def _way(constants, velocity, spin, i, j, duration):
     """How far points of particle i and partner j move against each other at the most [m]."""
-    speed = norm(row(spin, i)) * constants.radius[i]
-    passing = row(velocity, i)
+    speed = norm(load_vec3(spin, i)) * constants.radius[i]
+    passing = load_vec3(velocity, i)
     if j >= 0:
-        passing = sub(row(velocity, j), passing)
-        speed += norm(row(spin, j)) * constants.radius[j]
+        passing = sub(load_vec3(velocity, j), passing)
+        speed += norm(load_vec3(spin, j)) * constants.radius[j]
     return (norm(passing) + speed) * duration
 
 
@@ -75,13 +76,13 @@ def _touch(table, world, constants, state, ahead, i, j, points):
     shift = (0.0, 0.0, 0.0)
     if j < 0:
         return gap, normal, then, shift, count
-    offset = nearest_image(sub(row(state.position, j), row(state.position, i)), world.period)
+    offset = nearest_image(sub(load_vec3(state.position, j), load_vec3(state.position, i)), world.period)
     sphere_i, sphere_j = table.kind[constants.shape[i]] == SPHERE, table.kind[constants.shape[j]] == SPHERE
     if sphere_i and sphere_j:
-        normal = scaled(offset, 1.0 / norm(offset))
-        put(points, 0, scaled(normal, constants.radius[i]))
+        normal = scale(offset, 1.0 / norm(offset))
+        store_vec3(points, 0, scale(normal, constants.radius[i]))
     elif not sphere_i:
-        shift = scaled(sub(offset, then), 1.0 if sphere_j else 0.5)
+        shift = scale(sub(offset, then), 1.0 if sphere_j else 0.5)
     return gap, normal, offset, shift, count
 
 
@@ -93,8 +94,8 @@ def sunk_points(table, world, constants, state, ahead, spin, before, partner, po
     angular velocities in ``state``, ``before`` the velocities and angular velocities before they settled. Returns the
     points, their partners (m, 2), and before which of the points that there are they belong (m,).
     """
-    table, world, constants, state, ahead = borrowed((table, world, constants, state, ahead))
-    spin, before, partner, point = borrowed((spin, before, partner, point))
+    table, world, constants, state, ahead = without_refcounts((table, world, constants, state, ahead))
+    spin, before, partner, point = without_refcounts((spin, before, partner, point))
     points, spare = np.empty((MAX_MANIFOLD, 3)), np.empty((MAX_MANIFOLD, 3))
     more_partner, more = np.empty((MAX_MANIFOLD, 2), dtype=np.int64), np.empty((MAX_MANIFOLD, COLUMNS))
     place = np.empty((MAX_MANIFOLD, 1), dtype=np.int64)
@@ -115,9 +116,9 @@ def sunk_points(table, world, constants, state, ahead, spin, before, partner, po
         if gap >= present - _SINKING * inradius:
             continue
         while size + count > len(more):
-            more_partner, more, place = grown(more_partner), grown(more), grown(place)
+            more_partner, more, place = grow(more_partner), grow(more), grow(place)
         for m in range(size, size + count):
-            arm = add(row(points, m - size), shift)
+            arm = add(load_vec3(points, m - size), shift)
             write_point(constants, state, i, j, normal, offset, arm, inradius, restitution, slow, m, more_partner, more)
             place[m, 0] = k
             more[m, PARTING] = parting_at(before[0], before[1], i, j, more, m)

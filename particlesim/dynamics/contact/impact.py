@@ -11,9 +11,15 @@ import math
 
 import numpy as np
 
-from particlesim.core.constants import APPROACH_TOLERANCE, MAX_MANIFOLD, MAX_PATCH_IMPULSES, RESTING_DROP, WALL
+from particlesim.core.constants import (
+    APPROACH_TOLERANCE,
+    MAX_MANIFOLD,
+    MAX_PATCH_IMPULSES,
+    RESTITUTION_THRESHOLD_HEIGHT,
+    WALL,
+)
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import add, along, cross, dot, norm, put, row, row4, scaled, sub, vector
+from particlesim.core.math3d import add, axpy, cross, dot, load_quat, load_vec3, norm, scale, store_vec3, sub, to_vec3
 from particlesim.geometry.narrow_phase.half_space import wall_normal
 from particlesim.model.free_motion import particle_spin, spin_of
 from particlesim.model.touching import contact_now, wall_of_partner
@@ -33,7 +39,7 @@ TALLY = 8
 @kernel
 def _point_velocity(constants, state, i, arm):
     """Velocity of the point of particle ``i`` at ``arm`` from its centroid."""
-    return add(row(state.velocity, i), cross(particle_spin(constants, state, i), arm))
+    return add(load_vec3(state.velocity, i), cross(particle_spin(constants, state, i), arm))
 
 
 @kernel
@@ -43,7 +49,7 @@ def _inverse_mass_at(constants, state, i, arm, normal):
     1/m + n . ((I^-1 (r x n)) x r) (D. Baraff, SIGGRAPH 1997 course notes, Rigid Body Simulation II, eq. 8-18)
     """
     twist = cross(arm, normal)
-    spin = spin_of(row4(state.orientation, i), twist, row(constants.inertia, i))
+    spin = spin_of(load_quat(state.orientation, i), twist, load_vec3(constants.inertia, i))
     return dot(normal, normal) / constants.mass[i] + dot(twist, spin)
 
 
@@ -62,9 +68,9 @@ def approach(still, constants, state, i, j, point, offset, normal):
 
 @kernel
 def _resting_speed(world, constants, i):
-    """Speed below which an impact under gravity keeps its energy (see RESTING_DROP) [m/s]."""
-    g = norm(vector(world.gravity))
-    return math.sqrt(2.0 * g * RESTING_DROP * constants.inradius[i])
+    """Speed below which an impact under gravity keeps its energy (see RESTITUTION_THRESHOLD_HEIGHT) [m/s]."""
+    g = norm(to_vec3(world.gravity))
+    return math.sqrt(2.0 * g * RESTITUTION_THRESHOLD_HEIGHT * constants.inradius[i])
 
 
 @kernel
@@ -83,8 +89,8 @@ def restitution_of(world, constants, i, j):
 def _middle(points, count):
     total = (0.0, 0.0, 0.0)
     for k in range(count):
-        total = add(total, row(points, k))
-    return scaled(total, 1.0 / count)
+        total = add(total, load_vec3(points, k))
+    return scale(total, 1.0 / count)
 
 
 @kernel
@@ -99,9 +105,9 @@ def _point_to_answer(still, constants, state, i, j, points, count, offset, norma
     if parting >= -tolerance:
         parting = 0.0
         for k in range(count):
-            at_corner, small = approach(still, constants, state, i, j, row(points, k), offset, normal)
+            at_corner, small = approach(still, constants, state, i, j, load_vec3(points, k), offset, normal)
             if at_corner < parting and at_corner < -small:
-                parting, point = at_corner, row(points, k)
+                parting, point = at_corner, load_vec3(points, k)
     return point, parting
 
 
@@ -116,9 +122,9 @@ def _stretch(constants, state, whom, size, push, twist, gain):
     growth = 0.0
     for k in range(size):
         i = whom[k]
-        change = row(push, k)
-        momentum = row(twist, k)
-        spin = spin_of(row4(state.orientation, i), momentum, row(constants.inertia, i))
+        change = load_vec3(push, k)
+        momentum = load_vec3(twist, k)
+        spin = spin_of(load_quat(state.orientation, i), momentum, load_vec3(constants.inertia, i))
         growth += dot(change, change) / constants.mass[i] + dot(momentum, spin)
     return gain / growth
 
@@ -154,13 +160,13 @@ def let_go(world, constants, acceleration, i, left, tally):
     If it was held, it has had its share of gravity for the whole stretch. What it weighs is no longer borne by the
     walls that gravity presses against.
     """
-    gravity = vector(world.gravity)
+    gravity = to_vec3(world.gravity)
     if is_held(acceleration, i):
         for wall in range(6):
             pull = dot(wall_normal(wall), gravity)
             if world.boundary[wall // 2] == WALL and pull > 0.0:
                 tally[WALLS + wall] -= constants.mass[i] * pull * left
-    put(acceleration, i, gravity)
+    store_vec3(acceleration, i, gravity)
 
 
 @kernel
@@ -199,18 +205,18 @@ def answer(table, world, constants, state, acceleration, contacts, count, whom, 
     for c in range(count):
         i, j = contacts[c, 0], contacts[c, 1]
         _, normal, offset, corners[c] = contact_now(table, world, constants, state, i, j, points[c])
-        put(normals, c, normal)
-        put(offsets, c, offset)
+        store_vec3(normals, c, normal)
+        store_vec3(offsets, c, offset)
         answered[c] = False
     outcome = NOTHING
     for _ in range(MAX_PATCH_IMPULSES):
         for k in range(size):
-            put(push, k, (0.0, 0.0, 0.0))
-            put(twist, k, (0.0, 0.0, 0.0))
+            store_vec3(push, k, (0.0, 0.0, 0.0))
+            store_vec3(twist, k, (0.0, 0.0, 0.0))
         gain = 0.0
         for c in range(count):
             i, j = contacts[c, 0], contacts[c, 1]
-            normal, offset = row(normals, c), row(offsets, c)
+            normal, offset = load_vec3(normals, c), load_vec3(offsets, c)
             point, parting = _point_to_answer(
                 world.still, constants, state, i, j, points[c], corners[c], offset, normal
             )
@@ -227,23 +233,27 @@ def answer(table, world, constants, state, acceleration, contacts, count, whom, 
                 impulse[c] = bounce * stop
                 gain += bounce * bounce * stop * -parting
                 slot = _slot(whom, size, i)
-                put(push, slot, along(row(push, slot), normal, -impulse[c]))
-                put(twist, slot, along(row(twist, slot), cross(point, normal), -impulse[c]))
+                store_vec3(push, slot, axpy(load_vec3(push, slot), normal, -impulse[c]))
+                store_vec3(twist, slot, axpy(load_vec3(twist, slot), cross(point, normal), -impulse[c]))
                 if j >= 0:
                     slot = _slot(whom, size, j)
-                    put(push, slot, along(row(push, slot), normal, impulse[c]))
-                    put(twist, slot, along(row(twist, slot), cross(sub(point, offset), normal), impulse[c]))
+                    store_vec3(push, slot, axpy(load_vec3(push, slot), normal, impulse[c]))
+                    store_vec3(twist, slot, axpy(load_vec3(twist, slot), cross(sub(point, offset), normal), impulse[c]))
         if gain == 0.0:
             break
         factor = 1.0 if count == 1 else _stretch(constants, state, whom, size, push, twist, gain)
         for k in range(size):
             i = whom[k]
-            put(state.velocity, i, along(row(state.velocity, i), row(push, k), factor / constants.mass[i]))
-            put(state.angular_momentum, i, along(row(state.angular_momentum, i), row(twist, k), factor))
+            store_vec3(
+                state.velocity, i, axpy(load_vec3(state.velocity, i), load_vec3(push, k), factor / constants.mass[i])
+            )
+            store_vec3(
+                state.angular_momentum, i, axpy(load_vec3(state.angular_momentum, i), load_vec3(twist, k), factor)
+            )
         for c in range(count):
             if impulse[c] > 0.0:
                 answered[c] = True
-                _tell(tally, contacts[c, 1], factor * impulse[c], row(offsets, c), row(normals, c))
+                _tell(tally, contacts[c, 1], factor * impulse[c], load_vec3(offsets, c), load_vec3(normals, c))
     for c in range(count):
         if answered[c]:
             tally[IMPACTS] += 1

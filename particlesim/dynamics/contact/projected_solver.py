@@ -18,8 +18,8 @@ import math
 
 import numpy as np
 
-from particlesim.core.jit import borrowed, kernel
-from particlesim.core.math3d import along, dot, put, row, sub, vector
+from particlesim.core.jit import kernel, without_refcounts
+from particlesim.core.math3d import axpy, dot, load_vec3, store_vec3, sub, to_vec3
 from particlesim.dynamics.contact.contact_points import (
     BEND,
     GAP,
@@ -54,9 +54,9 @@ _ROUNDING = 1e-13
 
 # Bodies come to rest this fraction of the inscribed radius apart. What rounds leave undone they sink into this slack
 # first, and into each other by _DEEP and a few times _URGENT. Neither can be seen; what touches is nearer than
-# RESTING_DROP. In one stretch a point may sink by a part _SHARE of the way that is left to it. Where none is left, all
-# but a tenth of what _URGENT leaves free is taken away: in a heap that is nearly at rest nothing gives the energy to
-# lift what has sunk.
+# RESTITUTION_THRESHOLD_HEIGHT. In one stretch a point may sink by a part _SHARE of the way that is left to it. Where
+# none is left, all but a tenth of what _URGENT leaves free is taken away: in a heap that is nearly at rest nothing
+# gives the energy to lift what has sunk.
 _SLACK = 2e-4
 _DEEP = 3e-5
 _SHARE = 0.25
@@ -194,9 +194,9 @@ def _turned(partner, point, impulse, before):
     after = before.copy()
     for k in range(len(impulse)):
         i, j = partner[k, 0], partner[k, 1]
-        put(after, i, along(row(after, i), column(point, k, LEVER_I), -impulse[k]))
+        store_vec3(after, i, axpy(load_vec3(after, i), column(point, k, LEVER_I), -impulse[k]))
         if j >= 0:
-            put(after, j, along(row(after, j), column(point, k, LEVER_J), impulse[k]))
+            store_vec3(after, j, axpy(load_vec3(after, j), column(point, k, LEVER_J), impulse[k]))
     return after
 
 
@@ -245,7 +245,9 @@ def _gain(mass, fall, pressed, old, new):
         if pressed[i]:
             v, w = _velocity_in(old[0], i), _velocity_in(new[0], i)
             gain += mass[i] * (0.5 * dot(w, w) - 0.5 * dot(v, v) - dot(fall, w))
-            gain += 0.5 * (dot(_spin_in(new[0], i), row(new[1], i)) - dot(_spin_in(old[0], i), row(old[1], i)))
+            gain += 0.5 * (
+                dot(_spin_in(new[0], i), load_vec3(new[1], i)) - dot(_spin_in(old[0], i), load_vec3(old[1], i))
+            )
     return gain
 
 
@@ -256,7 +258,7 @@ def _difference(mass, pressed, one, two):
     for i in range(len(mass)):
         if pressed[i]:
             v = sub(_velocity_in(two[0], i), _velocity_in(one[0], i))
-            spin, turn = sub(_spin_in(two[0], i), _spin_in(one[0], i)), sub(row(two[1], i), row(one[1], i))
+            spin, turn = sub(_spin_in(two[0], i), _spin_in(one[0], i)), sub(load_vec3(two[1], i), load_vec3(one[1], i))
             energy += 0.5 * (mass[i] * dot(v, v) + dot(spin, turn))
     return energy
 
@@ -315,9 +317,9 @@ def settle(world, constants, state, spin, partner, point, duration, impulse, acc
     (n, 3) are the angular velocities now. Pressed bodies have an ``acceleration`` (n, 3) of 0. Returns which they are,
     whether the impulses are good enough, and those without what makes points part again.
     """
-    world, constants, state = borrowed((world, constants, state))
+    world, constants, state = without_refcounts((world, constants, state))
     mass = constants.mass
-    g = vector(world.gravity)
+    g = to_vec3(world.gravity)
     fall = g[0] * duration, g[1] * duration, g[2] * duration
     small = _CONVERGED * math.sqrt(dot(fall, fall))
     count = len(mass)
@@ -366,7 +368,7 @@ def settle(world, constants, state, spin, partner, point, duration, impulse, acc
         _mark(partner, impulse, pressed, True)
     for i in range(len(mass)):
         if pressed[i]:
-            put(state.velocity, i, _velocity_in(motion, i))
-            put(state.angular_momentum, i, row(momentum, i))
-            put(acceleration, i, (0.0, 0.0, 0.0))
+            store_vec3(state.velocity, i, _velocity_in(motion, i))
+            store_vec3(state.angular_momentum, i, load_vec3(momentum, i))
+            store_vec3(acceleration, i, (0.0, 0.0, 0.0))
     return pressed, done, steady

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.core.constants import FREE, RESTING_DROP
+from particlesim.core.constants import FREE, RESTITUTION_THRESHOLD_HEIGHT
 from particlesim.dynamics.contact.active_set import expected_paces, find_cluster, surface_paces, walk
 from particlesim.dynamics.contact.contact_points import APART, FASTER, LEVER_I, handed_down
 from particlesim.dynamics.contact.end_of_step_correction import fly, sunk_points
@@ -78,7 +78,7 @@ class Resting:
         restitution = np.append(self._constants.restitution, self._world.restitution)
         if self._gravity == 0.0 or restitution.min() == 1.0 or not len(self._constants.mass):
             return np.inf
-        return 0.5 * float(np.sqrt(2.0 * RESTING_DROP * self._inradius / self._gravity))
+        return 0.5 * float(np.sqrt(2.0 * RESTITUTION_THRESHOLD_HEIGHT * self._inradius / self._gravity))
 
     @property
     def longest_stretch(self) -> float:

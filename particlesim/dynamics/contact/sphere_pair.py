@@ -11,7 +11,20 @@ import math
 
 from particlesim.core.constants import APPROACH_TOLERANCE, SPHERE, WALL
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import add, along, cross, dot, norm, put, put4, row, row4, scaled, sub, vector
+from particlesim.core.math3d import (
+    add,
+    axpy,
+    cross,
+    dot,
+    load_quat,
+    load_vec3,
+    norm,
+    scale,
+    store_quat,
+    store_vec3,
+    sub,
+    to_vec3,
+)
 from particlesim.dynamics.ccd.time_of_impact import sphere_meets_wall
 from particlesim.dynamics.contact.impact import IMPACTS, VIRIAL
 from particlesim.dynamics.events.paths import NOTHING_MET, UNCHAINED, write_piece
@@ -24,7 +37,7 @@ def meet_alone(kind, world, shape, met, first_met, i, j):
     """Whether the members of an island are spheres, without gravity, on whose paths there is one impact."""
     k = first_met[i]
     only_impact = k >= 0 and met[k, 1] == j and (k + 1 == len(met) or met[k + 1, 0] != i) and first_met[j] < 0
-    gravity = vector(world.gravity)
+    gravity = to_vec3(world.gravity)
     return only_impact and kind[shape[i]] == SPHERE and kind[shape[j]] == SPHERE and dot(gravity, gravity) == 0.0
 
 
@@ -51,9 +64,13 @@ def _inverse_mass(mass, moments, turn, arm, normal):
 @kernel
 def _arrived(state, inertia, i, time):
     """Position, orientation and moments of a particle without acceleration that has flown for ``time`` [s]."""
-    moments = row(inertia, i)
-    position = along(row(state.position, i), row(state.velocity, i), time)
-    return position, free_rotation(row4(state.orientation, i), row(state.angular_momentum, i), moments, time), moments
+    moments = load_vec3(inertia, i)
+    position = axpy(load_vec3(state.position, i), load_vec3(state.velocity, i), time)
+    return (
+        position,
+        free_rotation(load_quat(state.orientation, i), load_vec3(state.angular_momentum, i), moments, time),
+        moments,
+    )
 
 
 @kernel
@@ -61,10 +78,10 @@ def _enter(state, course, piece, particle, index, i, time, after):
     """Write the two pieces of path of a particle with one impact at ``time``, and its state just ``after`` it."""
     write_piece(piece, index, 0.0, state, course.acceleration, i)
     position, turn, velocity, momentum = after
-    put(state.position, i, position)
-    put4(state.orientation, i, turn)
-    put(state.velocity, i, velocity)
-    put(state.angular_momentum, i, momentum)
+    store_vec3(state.position, i, position)
+    store_quat(state.orientation, i, turn)
+    store_vec3(state.velocity, i, velocity)
+    store_vec3(state.angular_momentum, i, momentum)
     write_piece(piece, index + 1, time, state, course.acceleration, i)
     particle[index, 0] = particle[index + 1, 0] = i
     course.head[i], course.clock[i], course.stamp[i], course.impacts[i] = UNCHAINED, time, 1, 1
@@ -78,15 +95,15 @@ def answer_two(world, constants, state, course, i, j, time, duration, tally, pie
     """
     x_i, turn_i, moments_i = _arrived(state, constants.inertia, i, time)
     x_j, turn_j, moments_j = _arrived(state, constants.inertia, j, time)
-    v_i, v_j = row(state.velocity, i), row(state.velocity, j)
-    momentum_i, momentum_j = row(state.angular_momentum, i), row(state.angular_momentum, j)
+    v_i, v_j = load_vec3(state.velocity, i), load_vec3(state.velocity, j)
+    momentum_i, momentum_j = load_vec3(state.angular_momentum, i), load_vec3(state.angular_momentum, j)
     offset = nearest_image(sub(x_j, x_i), world.period)
     distance = norm(offset)
     if distance == 0.0 or course.head[i] != NOTHING_MET or course.head[j] != NOTHING_MET:
         return False
-    normal = scaled(offset, 1.0 / distance)
+    normal = scale(offset, 1.0 / distance)
     separation = distance - 0.5 * (constants.size[i] + constants.size[j])
-    arm_i = scaled(normal, 0.5 * (constants.size[i] + separation))
+    arm_i = scale(normal, 0.5 * (constants.size[i] + separation))
     arm_j = sub(arm_i, offset)
     of_i = add(v_i, cross(spin_of(turn_i, momentum_i, moments_i), arm_i))
     of_j = add(v_j, cross(spin_of(turn_j, momentum_j, moments_j), arm_j))
@@ -97,8 +114,8 @@ def answer_two(world, constants, state, course, i, j, time, duration, tally, pie
     inverse_mass += _inverse_mass(constants.mass[j], moments_j, turn_j, arm_j, normal)
     bounce = 1.0 + min(constants.restitution[i], constants.restitution[j])
     impulse = bounce * (-parting / inverse_mass)
-    v_i = along(v_i, scaled(normal, -impulse), 1.0 / constants.mass[i])
-    v_j = along(v_j, scaled(normal, impulse), 1.0 / constants.mass[j])
+    v_i = axpy(v_i, scale(normal, -impulse), 1.0 / constants.mass[i])
+    v_j = axpy(v_j, scale(normal, impulse), 1.0 / constants.mass[j])
     left = duration - time
     if (
         dot(sub(v_j, v_i), normal) <= -1e-3 * parting
@@ -106,8 +123,8 @@ def answer_two(world, constants, state, course, i, j, time, duration, tally, pie
         or _meets_a_wall(world, x_j, v_j, constants.radius[j], left)
     ):
         return False
-    momentum_i = along(momentum_i, scaled(cross(arm_i, normal), -impulse), 1.0)
-    momentum_j = along(momentum_j, scaled(cross(arm_j, normal), impulse), 1.0)
+    momentum_i = axpy(momentum_i, scale(cross(arm_i, normal), -impulse), 1.0)
+    momentum_j = axpy(momentum_j, scale(cross(arm_j, normal), impulse), 1.0)
     _enter(state, course, piece, particle, pieces, i, time, (x_i, turn_i, v_i, momentum_i))
     _enter(state, course, piece, particle, pieces + 2, j, time, (x_j, turn_j, v_j, momentum_j))
     tally[VIRIAL] += impulse * dot(offset, normal)

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from particlesim.core.constants import MAX_MANIFOLD, SPHERE, WALL
-from particlesim.core.jit import borrowed, kernel
-from particlesim.core.math3d import along, norm, put, row, scaled, sub
-from particlesim.core.parallel import Crew
+from particlesim.core.jit import kernel, without_refcounts
+from particlesim.core.math3d import axpy, load_vec3, norm, scale, store_vec3, sub
+from particlesim.core.parallel import ThreadTeam
 from particlesim.dynamics.ccd.pair_impact import body_of, later, pair_meets, wall_meets
 from particlesim.dynamics.ccd.swept_bounds import balls, free_way, sieve, sieve_walls
 from particlesim.dynamics.ccd.time_of_impact import stays_apart
@@ -43,7 +43,7 @@ def _path_at(log, state, course, constants, i, piece, time):
     else:
         path = path_of_state(state, course.acceleration, i)
         begun = 0.0
-    return later(path, row(constants.inertia, i), time - begun)
+    return later(path, load_vec3(constants.inertia, i), time - begun)
 
 
 @kernel(inline=True)
@@ -97,14 +97,14 @@ def _stay_apart(table, world, constants, state, course, i, j, normals, slot, dur
     length = norm(known)
     apart = length > 0.0
     if apart:
-        known = scaled(known, 1.0 / length)
+        known = scale(known, 1.0 / length)
         apart = stays_apart(table, body_i, path_i, body_j, path_j, offset, known, duration)
     if not apart:
         gap, normal, corners = pair_separation(
             table, body_i[0], body_i[1], path_i[1], body_j[0], body_j[1], path_j[1], offset, NO_CORNERS, points
         )
         if gap > 0.0:
-            put(normals, slot, normal)
+            store_vec3(normals, slot, normal)
             apart = stays_apart(table, body_i, path_i, body_j, path_j, offset, normal, duration)
     return apart, corners
 
@@ -117,8 +117,8 @@ def _look_closer(
 
     Pairs whose ``slots`` are not -1 go straight on, and have a row in ``normals`` (see neighbours.py).
     """
-    table, world, constants, state, course, log = borrowed((table, world, constants, state, course, log))
-    pairs, normals, slots, times, points = borrowed((pairs, normals, slots, times, points))
+    table, world, constants, state, course, log = without_refcounts((table, world, constants, state, course, log))
+    pairs, normals, slots, times, points = without_refcounts((pairs, normals, slots, times, points))
     kind, shape = table.kind, constants.shape
     for k in range(first, last):
         if times[k] < 0.0:
@@ -143,7 +143,7 @@ def _across(island, head, first_piece, ball, period, lists, whom, first, last):
 
     ``whom`` are all those whose pieces of path begin with ``first_piece`` or later; pairs among them stand there once.
     """
-    island, head, ball, lists, whom = borrowed((island, head, ball, lists, whom))
+    island, head, ball, lists, whom = without_refcounts((island, head, ball, lists, whom))
     particle, place, start, other = lists
     around = around_of(period)
     most = 0
@@ -168,7 +168,7 @@ def _across(island, head, first_piece, ball, period, lists, whom, first, last):
 @kernel
 def _is_near(position, anchor, leash, bulge, period, i):
     """Whether a place is on the leash of particle ``i``, and the tops of parabolas to and from there are."""
-    return norm(nearest_image(sub(position, row(anchor, i)), period)) + bulge <= leash[i]
+    return norm(nearest_image(sub(position, load_vec3(anchor, i)), period)) + bulge <= leash[i]
 
 
 @kernel
@@ -180,21 +180,25 @@ def _follow_paths(
 
     A parabola between two points on it is farther out than both by at most a t^2 / 8.
     """
-    log_piece, following, head, state, acceleration = borrowed((log_piece, following, head, state, acceleration))
-    radius, place, anchor, leash, period, ball, whom = borrowed((radius, place, anchor, leash, period, ball, whom))
+    log_piece, following, head, state, acceleration = without_refcounts(
+        (log_piece, following, head, state, acceleration)
+    )
+    radius, place, anchor, leash, period, ball, whom = without_refcounts(
+        (radius, place, anchor, leash, period, ball, whom)
+    )
     on_leash = True
     for k in range(first, last):
         i = whom[k]
         piece, way = head[i], 0.0
         if piece < 0:
-            way = free_way(row(state.velocity, i), row(acceleration, i), duration)
+            way = free_way(load_vec3(state.velocity, i), load_vec3(acceleration, i), duration)
         while piece >= 0:
             after = following[piece]
             time = (log_piece[after, 0] if after >= 0 else duration) - log_piece[piece, 0]
             position, _, velocity, _, pull = path_of_piece(log_piece, piece)
             way += free_way(velocity, pull, time)
             bulge = 0.125 * norm(pull) * time * time
-            end = along(along(position, velocity, time), pull, 0.5 * time * time)
+            end = axpy(axpy(position, velocity, time), pull, 0.5 * time * time)
             on_leash = on_leash and _is_near(position, anchor, leash, bulge, period, i)
             on_leash = on_leash and _is_near(end, anchor, leash, bulge, period, i)
             piece = after
@@ -210,7 +214,7 @@ def follow_paths(where: Where, neighbours: Neighbours, ball: np.ndarray, whom: n
         log.piece, log.following, course.head, state, course.acceleration, constants.radius,
         at.lists.place, at.anchor, at.leash, world.period, duration, ball, whom,
     )  # fmt: skip
-    return all(Crew(len(whom)).each(lambda _, first, last: _follow_paths(*arguments, first, last), len(whom)))
+    return all(ThreadTeam(len(whom)).each(lambda _, first, last: _follow_paths(*arguments, first, last), len(whom)))
 
 
 def _met(
@@ -218,7 +222,7 @@ def _met(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Those of the pairs that meet, and when, with the times of -1 filled in (see ``_look_closer``)."""
     arguments = pairs, normals, slots, times, duration
-    crew = Crew(_LOOK * len(pairs))
+    crew = ThreadTeam(_LOOK * len(pairs))
     # Some pairs take far longer than others: threads that are done take on more.
     crew.each(
         lambda _, first, last: _look_closer(*where, *arguments, np.empty((MAX_MANIFOLD, 3)), first, last),
@@ -240,7 +244,7 @@ def first_meetings(
     table, world, constants, state, course, _ = where
     count, at = len(constants.radius), neighbours
     moving = constants.radius, state.position, state.velocity, course.acceleration
-    crew = Crew(count)
+    crew = ThreadTeam(count)
     alike = all(crew.each(lambda _, first, last: balls(*moving, at.lists.place, duration, ball, first, last), count))
     among = (
         course.acceleration,
@@ -272,7 +276,7 @@ def missed_meetings(
     """
     _, world, _, _, course, _ = where
     arguments = course.island, course.head, first_piece, ball, world.period, neighbours.lists, whom
-    parts = Crew(len(whom)).each(lambda _, first, last: _across(*arguments, first, last), len(whom))
+    parts = ThreadTeam(len(whom)).each(lambda _, first, last: _across(*arguments, first, last), len(whom))
     pairs = np.concatenate(parts)
     nowhere = np.full(len(pairs), -1, dtype=np.int64)
     met, _ = _met(where, pairs, neighbours.normal, nowhere, np.full(len(pairs), -1.0), duration)

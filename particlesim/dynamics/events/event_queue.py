@@ -8,8 +8,8 @@ import math
 import numpy as np
 
 from particlesim.core.constants import MAX_IMPACTS, MAX_SLOW_IMPACTS, SIMULTANEOUS
-from particlesim.core.jit import borrowed, kernel
-from particlesim.core.math3d import grown, put, put4, row
+from particlesim.core.jit import kernel, without_refcounts
+from particlesim.core.math3d import grow, load_vec3, store_quat, store_vec3
 from particlesim.dynamics.ccd.pair_impact import body_of, later, pair_meets, wall_meets
 from particlesim.dynamics.contact.impact import NOTHING, STRUCK, answer, let_go
 from particlesim.dynamics.contact.sphere_pair import answer_two, meet_alone
@@ -51,7 +51,7 @@ def _foretell(table, world, constants, state, course, lists, whom, done, soonest
         j = lists.particle[lists.other[near]]
         if island[j] != island[i] or _among(whom, done, j):
             continue
-        moments = row(constants.inertia, j)
+        moments = load_vec3(constants.inertia, j)
         path_j = later(path_of_state(state, course.acceleration, j), moments, now - clock[j])
         body_j = body_of(constants, j)
         one, on, two, upon = body, path, body_j, path_j
@@ -126,10 +126,10 @@ def _bring(state, course, constants, i, time):
     course.clock[i] = time
     if since != 0.0:
         path = path_of_state(state, course.acceleration, i)
-        position, turn, velocity, _, _ = later(path, row(constants.inertia, i), since)
-        put(state.position, i, position)
-        put4(state.orientation, i, turn)
-        put(state.velocity, i, velocity)
+        position, turn, velocity, _, _ = later(path, load_vec3(constants.inertia, i), since)
+        store_vec3(state.position, i, position)
+        store_quat(state.orientation, i, turn)
+        store_vec3(state.velocity, i, velocity)
 
 
 @kernel
@@ -191,9 +191,9 @@ def run_islands(
     ``tally`` (n, TALLY) of each island's first member.
     Returns the pieces of path and whose they are, and how many islands were left with impacts to answer.
     """
-    table, world, constants, state, course = borrowed((table, world, constants, state, course))
-    lists, met, times, first_met = borrowed((lists, met, times, first_met))
-    edges, member, tally, points = borrowed((edges, member, tally, points))
+    table, world, constants, state, course = without_refcounts((table, world, constants, state, course))
+    lists, met, times, first_met = without_refcounts((lists, met, times, first_met))
+    edges, member, tally, points = without_refcounts((edges, member, tally, points))
     stamp, head = course.stamp, course.head
     contacts, whom = np.empty((64, 2), dtype=np.int64), np.empty(128, dtype=np.int64)
     piece, particle = np.empty((256, PIECE)), np.empty((256, 1), dtype=np.int64)
@@ -205,7 +205,7 @@ def run_islands(
         i, j = min(members[0], members[-1]), max(members[0], members[-1])
         if len(members) == 2 and meet_alone(table.kind, world, constants.shape, met, first_met, i, j):
             while pieces + 4 > len(piece):
-                piece, particle = grown(piece), grown(particle)
+                piece, particle = grow(piece), grow(particle)
             if answer_two(
                 world, constants, state, course, i, j, times[first_met[i]], duration, tally[i], piece, particle, pieces
             ):
@@ -220,7 +220,7 @@ def run_islands(
                 break
             left -= 1
             while pieces + 2 * size > len(piece):
-                piece, particle = grown(piece), grown(particle)
+                piece, particle = grow(piece), grow(particle)
             for m in range(size):
                 i = whom[m]
                 if head[i] == NOTHING_MET:
@@ -261,6 +261,6 @@ def run_islands(
         if left == 0:
             unfinished += 1
             while pieces + 2 * len(members) > len(piece):
-                piece, particle = grown(piece), grown(particle)
+                piece, particle = grow(piece), grow(particle)
             pieces = _halt(state, course, constants, members, time, duration, piece, particle, pieces)
     return piece[:pieces], particle[:pieces, 0], unfinished

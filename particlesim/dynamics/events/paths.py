@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import put, put4, row, row4
+from particlesim.core.math3d import load_quat, load_vec3, store_quat, store_vec3
 
 # What stands in place of a first piece: there is none, or it is not chained yet.
 NOTHING_MET = -1
@@ -95,11 +95,11 @@ def path_of_piece(piece, index):
 def path_of_state(state, acceleration, i):
     """Position, orientation, velocity, angular momentum and acceleration of particle ``i``."""
     return (
-        row(state.position, i),
-        row4(state.orientation, i),
-        row(state.velocity, i),
-        row(state.angular_momentum, i),
-        row(acceleration, i),
+        load_vec3(state.position, i),
+        load_quat(state.orientation, i),
+        load_vec3(state.velocity, i),
+        load_vec3(state.angular_momentum, i),
+        load_vec3(acceleration, i),
     )
 
 
@@ -136,11 +136,11 @@ def rewind(course, log, state, particles):
         course.stamp[i] = course.impacts[i] = 0
         if course.head[i] >= 0:
             position, turn, velocity, momentum, pull = path_of_piece(log.piece, course.head[i])
-            put(state.position, i, position)
-            put4(state.orientation, i, turn)
-            put(state.velocity, i, velocity)
-            put(state.angular_momentum, i, momentum)
-            put(course.acceleration, i, pull)
+            store_vec3(state.position, i, position)
+            store_quat(state.orientation, i, turn)
+            store_vec3(state.velocity, i, velocity)
+            store_vec3(state.angular_momentum, i, momentum)
+            store_vec3(course.acceleration, i, pull)
             course.head[i] = NOTHING_MET
 
 

@@ -10,7 +10,7 @@ construction, not by subtraction of nearly equal points: hulls that all but touc
 import math
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import add, along, apply, apply_transposed, cross, dot, norm, row, scaled, sub
+from particlesim.core.math3d import add, axpy, cross, dot, load_vec3, mat_transposed_vec, mat_vec, norm, scale, sub
 
 # The search ends when a corner of the difference body can be nearer than the simplex by no more than this fraction.
 _GAP = 1e-15
@@ -33,11 +33,11 @@ NO_CORNERS = (0, (-1, -1, -1, -1), (-1, -1, -1, -1))
 @kernel
 def _support(vertices, matrix, direction):
     """The number of the vertex of a hull farthest along ``direction``; vertices (v, 3) in body axes."""
-    local = apply_transposed(matrix, direction)
+    local = mat_transposed_vec(matrix, direction)
     best = 0
     farthest = -math.inf
     for v in range(len(vertices)):
-        reach = dot(row(vertices, v), local)
+        reach = dot(load_vec3(vertices, v), local)
         if reach > farthest:
             farthest = reach
             best = v
@@ -47,7 +47,7 @@ def _support(vertices, matrix, direction):
 @kernel
 def _vertex(vertices, size, matrix, v):
     """Vertex ``v`` of a hull relative to its centroid, in world axes."""
-    return apply(matrix, scaled(row(vertices, v), size))
+    return mat_vec(matrix, scale(load_vec3(vertices, v), size))
 
 
 @kernel
@@ -57,7 +57,7 @@ def _nearest_on_segment(p, a):
     length2 = dot(e, e)
     if length2 <= 0.0:
         return -1.0, _ORIGIN
-    return -dot(p, e) / length2, scaled(cross(e, cross(p, e)), 1.0 / length2)
+    return -dot(p, e) / length2, scale(cross(e, cross(p, e)), 1.0 / length2)
 
 
 @kernel
@@ -70,8 +70,8 @@ def _nearest_on_triangle(p, a, b):
         return -1.0, -1.0, _ORIGIN
     # The normal of a sliver is uncertain across it, where it is narrow: only that part of p may meet the error.
     longer = e if dot(e, e) > dot(f, f) else f
-    across = along(p, longer, -dot(p, longer) / dot(longer, longer))
-    return dot(cross(f, p), n) / area2, dot(cross(p, e), n) / area2, scaled(n, dot(across, n) / area2)
+    across = axpy(p, longer, -dot(p, longer) / dot(longer, longer))
+    return dot(cross(f, p), n) / area2, dot(cross(p, e), n) / area2, scale(n, dot(across, n) / area2)
 
 
 @kernel
@@ -141,7 +141,7 @@ def _weighted(vertices, size, matrix, picks, weights, count):
     """The point that ``weights`` make of ``count`` vertices of a hull, relative to its centroid."""
     point = _ORIGIN
     for k in range(count):
-        point = along(point, _vertex(vertices, size, matrix, picks[k]), weights[k])
+        point = axpy(point, _vertex(vertices, size, matrix, picks[k]), weights[k])
     return point
 
 
@@ -176,7 +176,7 @@ def hull_distance(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, of
     for step in range(_MAX_STEPS):
         searched = step >= known[0]
         a = _support(vertices_a, matrix_a, v) if searched else known[1][step]
-        b = _support(vertices_b, matrix_b, scaled(v, -1.0)) if searched else known[2][step]
+        b = _support(vertices_b, matrix_b, scale(v, -1.0)) if searched else known[2][step]
         w = sub(add(offset, _vertex(vertices_b, size_b, matrix_b, b)), _vertex(vertices_a, size_a, matrix_a, a))
         if searched:
             bound = dot(v, w) / norm(v)

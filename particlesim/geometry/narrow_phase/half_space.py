@@ -6,7 +6,7 @@ import numpy as np
 
 from particlesim.core.constants import MAX_MANIFOLD, PARALLEL_TOLERANCE, SPHERE
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import apply, dot, matrix_of, put, row, scaled
+from particlesim.core.math3d import dot, load_vec3, mat_vec, quat_to_matrix, scale, store_vec3
 from particlesim.geometry.narrow_phase.contact_manifold import MAX_CORNERS, facing_feature
 
 
@@ -26,12 +26,12 @@ def wall_separation(table, lower, upper, wall, shape, size, turn, position):
     if table.kind[shape] == SPHERE:
         reach = 0.5
     else:
-        matrix = matrix_of(turn)
+        matrix = quat_to_matrix(turn)
         outwards = wall_normal(wall)
         vertex = table.vertex
         reach = -math.inf
         for v in range(table.vertex_start[shape], table.vertex_start[shape + 1]):
-            reach = max(reach, dot(outwards, apply(matrix, row(vertex, v))))
+            reach = max(reach, dot(outwards, mat_vec(matrix, load_vec3(vertex, v))))
     return room - size * reach
 
 
@@ -44,13 +44,13 @@ def wall_contact(table, world, wall, shape, size, turn, position, points):
     separation = wall_separation(table, world.lower, world.upper, wall, shape, size, turn, position)
     outwards = wall_normal(wall)
     if table.kind[shape] == SPHERE:
-        put(points, 0, scaled(outwards, 0.5 * size))
+        store_vec3(points, 0, scale(outwards, 0.5 * size))
         return separation, 1
     feature = np.empty((MAX_CORNERS, 3))
     count, _ = facing_feature(
-        table, shape, size, matrix_of(turn), (0.0, 0.0, 0.0), outwards, PARALLEL_TOLERANCE, feature
+        table, shape, size, quat_to_matrix(turn), (0.0, 0.0, 0.0), outwards, PARALLEL_TOLERANCE, feature
     )
     kept = min(count, MAX_MANIFOLD)
     for k in range(kept):
-        put(points, k, row(feature, k * count // kept))
+        store_vec3(points, k, load_vec3(feature, k * count // kept))
     return separation, kept

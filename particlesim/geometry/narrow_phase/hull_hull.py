@@ -4,7 +4,7 @@ import numpy as np
 
 from particlesim.core.constants import MAX_MANIFOLD, PARALLEL_TOLERANCE
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import add, matrix_of, norm, scaled
+from particlesim.core.math3d import add, norm, quat_to_matrix, scale
 from particlesim.geometry.narrow_phase.contact_manifold import hull_patch
 from particlesim.geometry.narrow_phase.gjk import NO_CORNERS, hull_distance, hulls_apart
 from particlesim.geometry.narrow_phase.separating_axis import hull_depth
@@ -29,10 +29,10 @@ def hulls_nearer(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset
     return not hulls_apart(
         _vertices(table, shape_a),
         size_a,
-        matrix_of(turn_a),
+        quat_to_matrix(turn_a),
         _vertices(table, shape_b),
         size_b,
-        matrix_of(turn_b),
+        quat_to_matrix(turn_b),
         offset,
         touching,
     )
@@ -58,17 +58,17 @@ def hull_separation(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b,
         known,
     )
     if separation > 0.0:
-        normal = scaled(apart, 1.0 / norm(apart))
+        normal = scale(apart, 1.0 / norm(apart))
     else:
         separation, normal = hull_depth(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset)
-    return separation, normal, scaled(add(point_a, point_b), 0.5), corners
+    return separation, normal, scale(add(point_a, point_b), 0.5), corners
 
 
 @kernel(inline=True)
 def hull_hull(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
     """Separation, normal from a to b and number of contact points of hull b at ``offset`` from hull a."""
     gaps = np.empty(MAX_MANIFOLD)
-    matrix_a, matrix_b = matrix_of(turn_a), matrix_of(turn_b)
+    matrix_a, matrix_b = quat_to_matrix(turn_a), quat_to_matrix(turn_b)
     separation, normal, middle, _ = hull_separation(
         table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset, NO_CORNERS
     )

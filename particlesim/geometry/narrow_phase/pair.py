@@ -2,7 +2,7 @@
 
 from particlesim.core.constants import SPHERE
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import add, matrix_of, put, row, scaled
+from particlesim.core.math3d import add, load_vec3, quat_to_matrix, scale, store_vec3
 from particlesim.geometry.narrow_phase.hull_hull import hull_hull, hull_separation, hulls_nearer
 from particlesim.geometry.narrow_phase.sphere_hull import hull_sphere
 from particlesim.geometry.narrow_phase.sphere_sphere import sphere_sphere
@@ -28,9 +28,9 @@ def _sphere_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, off
     if table.kind[shape_a] != SPHERE:
         separation, normal, count = hull_sphere(table, shape_a, size_a, turn_a, size_b, offset, points)
     elif table.kind[shape_b] != SPHERE:
-        separation, normal, count = hull_sphere(table, shape_b, size_b, turn_b, size_a, scaled(offset, -1.0), points)
-        normal = scaled(normal, -1.0)
-        put(points, 0, add(offset, row(points, 0)))
+        separation, normal, count = hull_sphere(table, shape_b, size_b, turn_b, size_a, scale(offset, -1.0), points)
+        normal = scale(normal, -1.0)
+        store_vec3(points, 0, add(offset, load_vec3(points, 0)))
     else:
         separation, normal, count = sphere_sphere(size_a, size_b, offset, points)
     return separation, normal, count
@@ -59,7 +59,7 @@ def pair_separation(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, off
         separation, normal, _ = _sphere_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points)
     else:
         separation, normal, _, corners = hull_separation(
-            table, shape_a, size_a, matrix_of(turn_a), shape_b, size_b, matrix_of(turn_b), offset, known
+            table, shape_a, size_a, quat_to_matrix(turn_a), shape_b, size_b, quat_to_matrix(turn_b), offset, known
         )
     return separation, normal, corners
 

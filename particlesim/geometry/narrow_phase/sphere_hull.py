@@ -3,7 +3,19 @@
 import math
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import along, apply, apply_transposed, cross, dot, matrix_of, norm, put, row, scaled, sub
+from particlesim.core.math3d import (
+    axpy,
+    cross,
+    dot,
+    load_vec3,
+    mat_transposed_vec,
+    mat_vec,
+    norm,
+    quat_to_matrix,
+    scale,
+    store_vec3,
+    sub,
+)
 
 # A centre nearer to an edge or a corner than this fraction of the hull's size takes the normal of a face there: the
 # direction from the nearest point is mostly rounding.
@@ -18,14 +30,14 @@ def _nearest_on_outline(vertices, size, loop, first, last, normal, centre):
     """
     over = True
     best, nearest = math.inf, centre
-    p = scaled(row(vertices, loop[last - 1]), size)
+    p = scale(load_vec3(vertices, loop[last - 1]), size)
     for k in range(first, last):
-        q = scaled(row(vertices, loop[k]), size)
+        q = scale(load_vec3(vertices, loop[k]), size)
         edge, to_centre = sub(q, p), sub(centre, p)
         if dot(cross(edge, normal), to_centre) > 0.0:
             over = False
             t = min(max(dot(to_centre, edge) / dot(edge, edge), 0.0), 1.0)
-            candidate = along(p, edge, t)
+            candidate = axpy(p, edge, t)
             distance = norm(sub(centre, candidate))
             if distance < best:
                 best, nearest = distance, candidate
@@ -39,12 +51,12 @@ def hull_sphere(table, shape, size, turn, diameter, offset, points):
     # Taken out of their struct once: each access counts references, which costs more than the arithmetic.
     face_normal, face_offset, loop, loop_start = table.face_normal, table.face_offset, table.loop, table.loop_start
     vertices = table.vertex[table.vertex_start[shape] : table.vertex_start[shape + 1]]
-    matrix = matrix_of(turn)
-    centre = apply_transposed(matrix, offset)
+    matrix = quat_to_matrix(turn)
+    centre = mat_transposed_vec(matrix, offset)
     highest, normal = -math.inf, (0.0, 0.0, 0.0)
     distance, nearest, over_face = math.inf, centre, False
     for f in range(table.face_start[shape], table.face_start[shape + 1]):
-        n = row(face_normal, f)
+        n = load_vec3(face_normal, f)
         height = dot(n, centre) - face_offset[f] * size
         if height > highest:
             highest, normal = height, n
@@ -54,14 +66,14 @@ def hull_sphere(table, shape, size, turn, diameter, offset, points):
                 vertices, size, loop, loop_start[f], loop_start[f + 1], n, centre
             )
             if over:
-                distance, nearest, normal, over_face = height, along(centre, n, -height), n, True
+                distance, nearest, normal, over_face = height, axpy(centre, n, -height), n, True
                 break
             if apart < distance:
                 distance, nearest = apart, candidate
     if highest <= 0.0:
-        distance, nearest = highest, along(centre, normal, -highest)
+        distance, nearest = highest, axpy(centre, normal, -highest)
     elif not over_face and distance > _ON_SURFACE * (table.radius[shape] * size):
-        normal = scaled(sub(centre, nearest), 1.0 / distance)
+        normal = scale(sub(centre, nearest), 1.0 / distance)
     separation = distance - 0.5 * diameter
-    put(points, 0, apply(matrix, along(nearest, normal, 0.5 * separation)))
-    return separation, apply(matrix, normal), 1
+    store_vec3(points, 0, mat_vec(matrix, axpy(nearest, normal, 0.5 * separation)))
+    return separation, mat_vec(matrix, normal), 1

@@ -1,7 +1,7 @@
 """Sphere against sphere: the closed form."""
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import norm, put, scaled
+from particlesim.core.math3d import norm, scale, store_vec3
 
 
 @kernel
@@ -11,7 +11,7 @@ def sphere_sphere(diameter_a, diameter_b, offset, points):
     Concentric spheres have no direction of their own: they take +x.
     """
     distance = norm(offset)
-    normal = scaled(offset, 1.0 / distance) if distance > 0.0 else (1.0, 0.0, 0.0)
+    normal = scale(offset, 1.0 / distance) if distance > 0.0 else (1.0, 0.0, 0.0)
     separation = distance - 0.5 * (diameter_a + diameter_b)
-    put(points, 0, scaled(normal, 0.5 * (diameter_a + separation)))
+    store_vec3(points, 0, scale(normal, 0.5 * (diameter_a + separation)))
     return separation, normal, 1

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.core.jit import kernel
-from particlesim.core.parallel import Crew
+from particlesim.core.parallel import ThreadTeam
 
 # Steps of brightness (0 .. 255) below both of these are no edges: the least, and the share of the brightest about.
 _DIM = np.float32(10.0)
@@ -31,7 +31,7 @@ def smooth_edges(image: np.ndarray) -> np.ndarray:
     # A rim as bright as what it surrounds, for the neighbours of the pixels there.
     bright = np.empty((height + 2, width + 2), dtype=np.float32)
     smooth = np.empty((height, width, 3), dtype=np.uint8)
-    crew = Crew(height * width)
+    crew = ThreadTeam(height * width)
     crew.each(lambda _, first, last: _brightness(image, bright, smooth, first, last), height)
     bright[0], bright[-1] = bright[1], bright[-2]
     crew.each(lambda _, first, last: _smooth(image, bright, smooth, first, last), height)

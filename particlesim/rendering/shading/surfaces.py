@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.core.jit import borrowed, kernel
-from particlesim.core.math3d import apply, cross, dot, matrix_of, norm, row, row4, scaled, sub, vector
-from particlesim.core.parallel import Crew
+from particlesim.core.jit import kernel, without_refcounts
+from particlesim.core.math3d import cross, dot, load_quat, load_vec3, mat_vec, norm, quat_to_matrix, scale, sub, to_vec3
+from particlesim.core.parallel import ThreadTeam
 from particlesim.rendering.visibility.geometry_tables import Bodies
 from particlesim.rendering.visibility.projection import Outlook
 from particlesim.rendering.visibility.rasterise import Sight
@@ -71,7 +71,7 @@ def table_of(
     def fill(_: int, first: int, last: int) -> None:
         _fill(surfaces, bodies, eye, ahead, outlook.scale, position, orientation, paint, table, first, last)
 
-    Crew(len(surfaces.parts)).each(fill, len(surfaces.parts))
+    ThreadTeam(len(surfaces.parts)).each(fill, len(surfaces.parts))
     return table
 
 
@@ -95,7 +95,7 @@ def _list_particles(owner, number, seen):
 @kernel
 def _list_surfaces(sight, bodies, number, first_slot, row_of, parts, balls, hulls):
     """Write first rows in place of owners, tile by tile; returns how many surfaces and rows there are."""
-    sight, bodies = borrowed(sight), borrowed(bodies)
+    sight, bodies = without_refcounts(sight), without_refcounts(bodies)
     owner, face = sight.owner, sight.face
     height, width = owner.shape
     surfaces = rows = 0
@@ -127,25 +127,25 @@ def _list_surfaces(sight, bodies, number, first_slot, row_of, parts, balls, hull
 
 
 @kernel
-def _fill(surfaces, bodies, eye, ahead, scale, position, orientation, paint, table, first, last):
-    surfaces, bodies = borrowed(surfaces), borrowed(bodies)
+def _fill(surfaces, bodies, eye, ahead, factor, position, orientation, paint, table, first, last):
+    surfaces, bodies = without_refcounts(surfaces), without_refcounts(bodies)
     for k in range(first, last):
         number, f, start = surfaces.parts[k, 0], surfaces.parts[k, 1], surfaces.parts[k, 2]
         i = surfaces.seen[number]
-        place = sub(row(position, i), vector(eye))
+        place = sub(load_vec3(position, i), to_vec3(eye))
         for channel in range(4):
             table[start + 1, channel] = paint[number, channel]
         if f < 0:
             _put_row(table, start, place, bodies.outer[i])
         else:
-            depth = dot(vector(ahead), place)
-            _put_face(bodies, i, f, place, depth, row4(orientation, i), scale, table, start)
+            depth = dot(to_vec3(ahead), place)
+            _put_face(bodies, i, f, place, depth, load_quat(orientation, i), factor, table, start)
 
 
 @kernel
-def _put_face(bodies, i, f, place, depth, turn, scale, table, start):
+def _put_face(bodies, i, f, place, depth, turn, factor, table, start):
     """All rows of a face but that of its paint."""
-    m, size, shape = matrix_of(turn), bodies.size[i], bodies.shape[i]
+    m, size, shape = quat_to_matrix(turn), bodies.size[i], bodies.shape[i]
     first = bodies.first_plane[shape]
     normal, offset = _plane(bodies.planes, first + f, m, size, place)
     _put_row(table, start, normal, offset)
@@ -157,15 +157,15 @@ def _put_face(bodies, i, f, place, depth, turn, scale, table, start):
         if f in (left, right):
             # How far the plane of the other face is, along this one, changes evenly over the picture too.
             other, beyond = _plane(bodies.planes, first + left + right - f, m, size, place)
-            inward = sub(scaled(normal, beyond / offset), other)
-            _put_row(table, start, scaled(inward, scale / norm(cross(normal, other))), 0.0)
+            inward = sub(scale(normal, beyond / offset), other)
+            _put_row(table, start, scale(inward, factor / norm(cross(normal, other))), 0.0)
             start += 1
 
 
 @kernel
 def _plane(planes, number, m, size, place):
     """Unit normal of a plane in world axes, and its distance from the eye along that."""
-    normal = apply(m, vector(planes[number]))
+    normal = mat_vec(m, to_vec3(planes[number]))
     return normal, dot(normal, place) + planes[number, 3] * size
 
 

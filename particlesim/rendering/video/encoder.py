@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from particlesim.core.atomic_write import appearing
+from particlesim.core.atomic_write import atomic_write
 from particlesim.rendering.errors import RenderError
 from particlesim.rendering.gl.platform import ffmpeg
 
@@ -45,7 +45,7 @@ def write_movie(
     Whatever goes wrong, ``path`` is whole or untouched. RenderError if ffmpeg fails or there is no image; ValueError
     for an image of another size; OSError for a path that cannot be written.
     """
-    with appearing(path) as hidden, _Encoder(_command(hidden, fps, size, crf), size) as encoder:
+    with atomic_write(path) as hidden, _Encoder(_command(hidden, fps, size, crf), size) as encoder:
         drawing, frames = 0.0, 0
         source = iter(images)
         while True:
@@ -67,7 +67,7 @@ def write_image(path: str | Path, image: np.ndarray) -> None:
 
     RenderError for an ending that stands for no format; OSError for a path that cannot be written.
     """
-    with appearing(path) as hidden:
+    with atomic_write(path) as hidden:
         try:
             Image.fromarray(image).save(hidden)
         except ValueError as error:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.core.jit import kernel
-from particlesim.core.parallel import Crew
+from particlesim.core.parallel import ThreadTeam
 
 # Particles of a group, about, where they are spread evenly.
 _TOGETHER = 16
@@ -41,7 +41,7 @@ def grouped(position: np.ndarray, outer: np.ndarray) -> Groups:
     """
     count = len(position)
     first, edge, shape = _cells(position)
-    crew = Crew(count)
+    crew = ThreadTeam(count)
     cell = np.empty(count, dtype=np.int32)
     inside = crew.each(lambda _, low, high: _cell_of_each(position, first, edge, shape, cell, low, high), count)
     # In a cell the particles of an earlier range come first.

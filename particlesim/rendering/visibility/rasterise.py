@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.core.jit import borrowed, kernel
-from particlesim.core.parallel import Crew
+from particlesim.core.jit import kernel, without_refcounts
+from particlesim.core.parallel import ThreadTeam
 from particlesim.rendering.visibility.geometry_tables import Bodies
 from particlesim.rendering.visibility.occlusion_clusters import Groups
 from particlesim.rendering.visibility.projection import Outlook, nearest_first
@@ -76,7 +76,7 @@ def look(outlook: Outlook, bodies: Bodies, groups: Groups, orientation: np.ndarr
         _look(order, middle, reach, groups, bodies, orientation, view, hull, sight, squares)
 
     # What hides what in a strip of the picture is told by that strip alone; some have more to look at than others.
-    crew = Crew(sight.close.size)
+    crew = ThreadTeam(sight.close.size)
     crew.each(strip, shape[1], 2 * crew.threads)
     return sight
 
@@ -84,8 +84,8 @@ def look(outlook: Outlook, bodies: Bodies, groups: Groups, orientation: np.ndarr
 @kernel
 def _look(order, middle, reach, groups, bodies, orientation, view, hull, sight, squares):
     """Visit all that a strip of the picture might see."""
-    groups, bodies, hull = borrowed(groups), borrowed(bodies), borrowed(hull)
-    sight, squares, view = borrowed(sight), borrowed(squares), borrowed(view)
+    groups, bodies, hull = without_refcounts(groups), without_refcounts(bodies), without_refcounts(hull)
+    sight, squares, view = without_refcounts(sight), without_refcounts(squares), without_refcounts(view)
     parallel, window, height = view[2], view[3], len(sight.close)
     for group in order:
         x, y, z = middle[group, 0], middle[group, 1], middle[group, 2]

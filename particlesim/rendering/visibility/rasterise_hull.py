@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import apply_transposed, matrix_of, row4, vector
+from particlesim.core.math3d import load_quat, mat_transposed_vec, quat_to_matrix, to_vec3
 from particlesim.rendering.visibility.geometry_tables import Bodies
 from particlesim.rendering.visibility.rasterise_sphere import pixels
 
@@ -42,11 +42,11 @@ def room_for(bodies: Bodies) -> Hull:
 @kernel
 def turned(axes, orientation, i):
     """The matrix from a particle's own axes to those of the one who looks, row by row."""
-    own = matrix_of(row4(orientation, i))
+    own = quat_to_matrix(load_quat(orientation, i))
     return (
-        apply_transposed(own, vector(axes[0])),
-        apply_transposed(own, vector(axes[1])),
-        apply_transposed(own, vector(axes[2])),
+        mat_transposed_vec(own, to_vec3(axes[0])),
+        mat_transposed_vec(own, to_vec3(axes[1])),
+        mat_transposed_vec(own, to_vec3(axes[2])),
     )
 
 
