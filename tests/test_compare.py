@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from particlesim import Simulation, cli
+from particlesim import Simulation
 from particlesim.benchmarks.broad_phase import compare_frames, compare_scene, sweep
 from particlesim.benchmarks.broad_phase.boxes import make_boxes
 from particlesim.benchmarks.broad_phase.measure import Found, Measured, digest, duration, measure_by_turns, peak_memory
@@ -15,6 +15,7 @@ from particlesim.benchmarks.broad_phase.peers import peer_search, peers
 from particlesim.benchmarks.broad_phase.stream import Stream, StreamError, read_stream, write_stream
 from particlesim.benchmarks.broad_phase.sweep import Sweep, SweepError, sizes_up_to
 from particlesim.broad_phase import METHODS
+from particlesim.cli import main as cli
 from particlesim.trajectory.frame_aabb import frame_boxes
 from tests.worlds import gas, listed, scene
 

@@ -57,7 +57,7 @@ def open_bridge(found: Platform) -> Any:
     # PyOpenGL reads the platform here, at its first import and never again.
     os.environ["PYOPENGL_PLATFORM"] = found.name
     try:
-        from particlesim.rendering import pyrender_bridge  # noqa: PLC0415
+        from particlesim.rendering.gl import pyrender_bridge  # noqa: PLC0415
     except (ImportError, AttributeError, OSError) as error:
         raise RenderError(f"cannot draw: {_one_line(str(error))}; install what OpenGL needs with: {FIX}") from error
     return pyrender_bridge
