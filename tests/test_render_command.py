@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 import particlesim as ps
 from particlesim.cli import main as cli
-from particlesim.scene.overrides import scaled, with_colour, with_look
+from particlesim.scene.overrides import scaled, with_colour, with_look, with_movie
 from tests.worlds import gas, listed, scene
 
 SCENE = """
@@ -139,6 +139,17 @@ def test_a_range_is_forgotten_with_the_field_that_it_was_given_for():
     one = scene({"shape": "sphere", "count": 3, "colour": "by_speed", "colour_range": (0.0, 2.0)})
     assert with_colour(one, "by_speed").particles[0].colour_range == (0.0, 2.0)
     assert with_colour(one, "by_height").particles[0].colour_range is None
+
+
+def test_what_stays_is_neither_copied_nor_checked_again():
+    one = scene(listed("cube", {"position": (0, 0, 0)}), {"shape": "sphere", "count": 8}, size=(4, 4, 4))
+    for other in (with_movie(one, quality="draft", resolution=None), with_colour(one, "red"), scaled(one, 2.0)):
+        assert other.world is one.world and other.solver is one.solver
+        assert other.particles[0].placement is one.particles[0].placement
+    with pytest.raises(ps.SceneError, match=r'^particles\[0\].colour = "odd": must be'):
+        with_colour(one, "odd")
+    with pytest.raises(ps.SceneError, match=r"^movie.crf = 99: must be a whole number from 0"):
+        with_movie(one, crf=99)
 
 
 def test_a_twin_fills_as_much_and_has_the_same_density_energy_and_speeds():

@@ -6,30 +6,33 @@ import math
 from typing import Any
 
 from particlesim.scene import Scene
-from particlesim.scene.base import MAX_COUNT
+from particlesim.scene.base import MAX_COUNT, Model
 from particlesim.scene.file import SceneError, parse_scene
+from particlesim.scene.groups import Group, ListPlacement
 
 # What decides how a scene is drawn, beside the colours of its groups.
 _LOOK = "camera", "movie", "show"
 
 
 def replaced(scene: Scene, **values: Any) -> Scene:
-    """The scene with other values under these keys, checked as those of a file. SceneError if they are wrong."""
-    return parse_scene({**scene.model_dump(mode="json"), **values})
+    """The scene with other values under these keys, checked as those of a file. SceneError if they are wrong.
+
+    Tables that stay are models already: they are taken over as they are and not checked again.
+    """
+    return parse_scene({**dict(scene), **values})
 
 
 def with_movie(scene: Scene, **values: Any) -> Scene:
     """The scene with other values in its table ``movie``. SceneError if they are wrong."""
-    return replaced(scene, movie={**scene.movie.model_dump(mode="json"), **values})
+    return replaced(scene, movie={**dict(scene.movie), **values})
 
 
 def with_colour(scene: Scene, colour: str) -> Scene:
     """The scene with all particles coloured like this. SceneError if it is no colour."""
-    groups = [group.model_dump(mode="json") for group in scene.particles]
-    for group in groups:
-        # A range is one of the field that it was given for.
-        group.update(colour=colour, colour_range=group["colour_range"] if group["colour"] == colour else None)
-    return replaced(scene, particles=groups)
+    # A range is one of the field that it was given for.
+    kept = [group.colour_range if group.colour == colour else None for group in scene.particles]
+    pairs = zip(scene.particles, kept, strict=True)
+    return replaced(scene, particles=[{**dict(group), "colour": colour, "colour_range": span} for group, span in pairs])
 
 
 def with_look(scene: Scene, other: Scene) -> Scene:
@@ -54,32 +57,40 @@ def scaled(scene: Scene, factor: float) -> Scene:
     that density, speeds, energy and pressure stay. Particles of a list stay as they are. SceneError if there are no
     others, or too many.
     """
-    groups = [group.model_dump(mode="json") for group in scene.particles]
-    counted = [group for group in groups if group["placement"]["kind"] != "list"]
+    counted = [group for group in scene.particles if not isinstance(group.placement, ListPlacement)]
     if not counted:
         raise SceneError("all of them are placed by lists, which cannot be scaled", "particles")
-    for group in counted:
-        _scale(group, factor)
-    number = sum(group["count"] for group in counted)
+    number = sum(_scaled_count(group, factor) for group in counted)
     if number > MAX_COUNT:
         raise SceneError(f"would be {number:,}; there may be up to {MAX_COUNT:,}", "particles")
-    return replaced(scene, particles=groups)
+    return replaced(
+        scene,
+        particles=[
+            group if isinstance(group.placement, ListPlacement) else _scaled(group, factor) for group in scene.particles
+        ],
+    )
 
 
-def _scale(group: dict[str, Any], factor: float) -> None:
-    """Change the table of a group in place."""
-    length = factor ** (-1.0 / 3.0)
-    # At least one of a group that is there at all.
-    group["count"] = max(math.floor(group["count"] * factor + 0.5), min(group["count"], 1))
-    for table, key, by in (
-        ("size", "value", length),
-        ("size", "low", length),
-        ("size", "high", length),
-        ("placement", "spacing", length),
-        ("velocity", "temperature", 1.0 / factor),
-        ("spin", "temperature", 1.0 / factor),
-    ):
-        if group[table].get(key) is not None:
-            group[table][key] *= by
-    if group["mass"] is not None:
-        group["mass"] /= factor
+def _scaled_count(group: Group, factor: float) -> int:
+    """At least one of a group that is there at all."""
+    return max(math.floor(group.number * factor + 0.5), min(group.number, 1))
+
+
+def _scaled(group: Group, factor: float) -> dict[str, Any]:
+    """The table of a group with ``factor`` times as many particles."""
+    length, energy = factor ** (-1.0 / 3.0), 1.0 / factor
+    return {
+        **dict(group),
+        "count": _scaled_count(group, factor),
+        "size": _times(group.size, length, "value", "low", "high"),
+        "placement": _times(group.placement, length, "spacing"),
+        "velocity": _times(group.velocity, energy, "temperature"),
+        "spin": _times(group.spin, energy, "temperature"),
+        "mass": None if group.mass is None else group.mass / factor,
+    }
+
+
+def _times(table: Model, factor: float, *keys: str) -> dict[str, Any]:
+    """A table whose numbers under these keys, where it has them, are multiplied by ``factor``."""
+    values = dict(table)
+    return {**values, **{key: values[key] * factor for key in keys if values.get(key) is not None}}
