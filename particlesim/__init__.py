@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from particlesim.rendering import RenderError
     from particlesim.scene import Scene
     from particlesim.scene.file import SceneError, load_scene
-    from particlesim.simulation.diagnostics import Ledger
     from particlesim.simulation.simulation import Simulation, SimulationError
+    from particlesim.trajectory.frames import Ledger
     from particlesim.trajectory.gsd_file import Trajectory, TrajectoryError
 
 _HOMES = {
     "CATALOGUE": "geometry.shapes",
-    "Ledger": "simulation.diagnostics",
+    "Ledger": "trajectory.frames",
     "Pose": "geometry.separation",
     "RenderError": "rendering",
     "Scene": "scene",

@@ -10,7 +10,7 @@ from particlesim.geometry import shapes
 from particlesim.rendering.visibility.geometry_tables import bodies_of
 from particlesim.rendering.visibility.occlusion_clusters import grouped
 from particlesim.rendering.visibility.projection import Outlook
-from particlesim.trajectory.gsd_file import Header
+from particlesim.trajectory.frames import Header
 
 KINDS = shapes.sphere(), shapes.cube(), shapes.pyramid()
 

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from particlesim.cli import main as cli
 from particlesim.jobs.summary import Summary
+from tests.worlds import ledger
 
 SCENE = """
 duration = 0.4
@@ -41,8 +42,7 @@ def summary(energies, *, elastic):
     """Of frames with these energies, nothing else of which changes."""
     made = Summary(1.0, (0.0, 0.0, 0.0), elastic)
     for k, energy in enumerate(energies):
-        ledger = {"kinetic_translational": energy, "kinetic_rotational": 0.0, "potential": 0.0, "largest_overlap": 0.0}
-        made.add(SimpleNamespace(time=float(k), ledger=ledger))
+        made.add(SimpleNamespace(ledger=ledger(time=float(k), kinetic_translational=energy)))
     return made
 
 

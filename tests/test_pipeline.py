@@ -19,7 +19,7 @@ def test_every_scene_runs(path):
     before = sim.ledger
     sim.run(steps=10)
     after = sim.ledger
-    assert after.largest_overlap < 0.05 * sim.particles.inradius.min()
+    assert sim.largest_overlap() < 0.05 * sim.particles.inradius.min()
     assert after.energy <= before.energy * (1 + 1e-9)
 
 

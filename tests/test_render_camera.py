@@ -9,7 +9,7 @@ import particlesim as ps
 from particlesim.geometry.shapes import sphere
 from particlesim.rendering.camera import FILL, Box, light_azimuth, subject_box, view_at
 from particlesim.scene import Scene
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.trajectory.frames import Frame, Header
 from tests.worlds import quick_twin
 
 SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))
@@ -147,7 +147,7 @@ def header(size):
 def frame(position, velocity=None):
     position = np.asarray(position, dtype=float)
     velocity = np.zeros_like(position) if velocity is None else np.asarray(velocity, dtype=float)
-    return Frame(0.0, position, None, velocity, None, None, None, {})
+    return Frame(0.0, position, None, velocity, None, None, None)
 
 
 def open_scene(camera="fixed", boundary="open", **settings):

@@ -9,7 +9,7 @@ from particlesim.rendering.octree_cells import cell_lines
 from particlesim.rendering.shading.colour import PALETTE, ParticleColours, map_colours, parse, shape_colours
 from particlesim.rendering.shading.fields import field_of, figures
 from particlesim.scene import Scene
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.trajectory.frames import Frame, Header
 
 
 def header(kinds, shape, group=None):
@@ -20,11 +20,11 @@ def header(kinds, shape, group=None):
     return Header("", kinds, shape, one, group, mass=one, inertia=np.ones((len(shape), 3)))
 
 
-def frame(velocity, time=0.0, **ledger):
+def frame(velocity, time=0.0):
     velocity = np.asarray(velocity, dtype=float)
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(velocity), 1))
     zero = np.zeros_like(velocity)
-    return Frame(time, zero, turn, velocity, zero, zero.astype(int), np.zeros(len(velocity), int), ledger)
+    return Frame(time, zero, turn, velocity, zero, zero.astype(int), np.zeros(len(velocity), int))
 
 
 def scene(*colours, gravity=(0.0, 0.0, 0.0), boundary="wall", span=None):

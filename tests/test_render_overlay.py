@@ -6,16 +6,18 @@ import pytest
 import particlesim as ps
 from particlesim.broad_phase import METHODS
 from particlesim.geometry import shapes
+from particlesim.rendering.hud.history import WINDOW, History
 from particlesim.rendering.hud.legend import swatches
 from particlesim.rendering.hud.overlay import Overlay, legend_places
 from particlesim.rendering.hud.panel import Panel, Style
-from particlesim.rendering.hud.readout import Moment, Readout, energy_change, pressure
-from particlesim.rendering.shading.colour import PALETTE, ParticleColours, encoded, map_colours
+from particlesim.rendering.hud.readout import energy_change, pressure, readout_rows
+from particlesim.rendering.look import look_of
+from particlesim.rendering.shading.colour import PALETTE, encoded, map_colours
 from particlesim.scene import Scene
 from particlesim.trajectory.frame_aabb import frame_boxes
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.trajectory.frames import Frame, Header
 from tests.gases import spheres
-from tests.worlds import gas
+from tests.worlds import gas, ledger
 
 
 def make_header(count, group=None):
@@ -24,11 +26,21 @@ def make_header(count, group=None):
     return Header("", (shapes.sphere(),), zero, one, zero if group is None else group, one, np.ones((count, 3)))
 
 
-def make_frame(count=1, time=0.0, velocity=(0.0, 0.0, 0.0), **ledger):
+def make_frame(count=1, time=0.0, velocity=(0.0, 0.0, 0.0), **known):
+    """Particles in one place, with a ledger if anything is known of it."""
     zero = np.zeros((count, 3))
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
     velocity = np.tile(np.asarray(velocity, float), (count, 1))
-    return Frame(time, zero, turn, velocity, zero, zero.astype(int), np.zeros(count, int), ledger)
+    return Frame(
+        time,
+        zero,
+        turn,
+        velocity,
+        zero,
+        zero.astype(int),
+        np.zeros(count, int),
+        ledger(time=time, **known) if known else None,
+    )
 
 
 def make_scene(*groups, size=(1280, 720), world=None, **show):
@@ -38,26 +50,25 @@ def make_scene(*groups, size=(1280, 720), world=None, **show):
 
 
 def rows_of(scene, frame, first, header=None):
-    rows = Readout(scene, header or make_header(len(frame.position)), first)(frame)
-    return [(row.name, row.value) for row in rows]
+    look = look_of(scene, header or make_header(len(frame.position)), first)
+    return [(row.name, row.value) for row in readout_rows(look, frame, History().then(first.ledger))]
 
 
-def overlay(scene, frame, first, dark=True, header=None):
-    header = header or make_header(len(first.position))
-    return Overlay(scene, header, first, ParticleColours(scene, header, first), dark)
+def overlay(scene, first, dark=True, header=None):
+    return Overlay(look_of(scene, header or make_header(len(first.position)), first), dark)
 
 
 def drawn(scene, frame, first=None, dark=True, header=None):
     """What the overlay changes in a grey picture, (h, w) bool, and the picture."""
     width, height = scene.movie.size
     image = np.full((height, width, 3), 120, dtype=np.uint8)
-    overlay(scene, frame, first or frame, dark, header).draw(image, frame)
+    overlay(scene, first or frame, dark, header).draw(image, frame, History())
     return np.any(image != 120, axis=2), image
 
 
 def test_the_usual_readout_says_what_the_ledger_knows():
     first = make_frame(1234, kinetic_translational=3.0, kinetic_rotational=1.0)
-    later = make_frame(1234, 1.5, kinetic_translational=1.0, kinetic_rotational=1.0, potential=1.9, impacts=12345.0)
+    later = make_frame(1234, 1.5, kinetic_translational=1.0, kinetic_rotational=1.0, potential=1.9, impacts=12345)
     assert rows_of(make_scene(), later, first) == [
         ("time", "1.50 s"),
         ("particles", "1,234"),
@@ -96,11 +107,11 @@ def test_pairs_tested_are_those_of_the_broad_phases():
 
 
 def pressure_of(sim, duration):
-    moments = [Moment(sim.time, sim.ledger.row())]
+    window = [sim.ledger]
     for _ in range(10):
         sim.run(duration / 10)
-        moments.append(Moment(sim.time, sim.ledger.row()))
-    return pressure(sim.scene, moments)
+        window.append(sim.ledger)
+    return pressure(sim.scene, window)
 
 
 def test_the_pressure_is_that_of_the_equation_of_state_on_walls_and_without():
@@ -116,28 +127,37 @@ def test_the_pressure_is_that_of_the_equation_of_state_on_walls_and_without():
 
 
 def test_a_world_that_is_open_has_no_pressure_and_a_first_frame_not_yet():
-    ledger = {"wall_impulse": np.ones(6), "virial": 1.0, "kinetic_translational": 1.0}
-    moments = [Moment(0.0, ledger), Moment(1.0, ledger)]
-    assert pressure(make_scene(world={"boundary": ("open", "periodic", "open")}), moments) is None
+    known = {"wall_impulse": np.ones(6), "virial": 1.0, "kinetic_translational": 1.0}
+    window = [ledger(time=0.0, **known), ledger(time=1.0, **known)]
+    assert pressure(make_scene(world={"boundary": ("open", "periodic", "open")}), window) is None
     scene = make_scene(readout=["pressure"])
-    assert rows_of(scene, make_frame(**ledger), make_frame(**ledger)) == []
-    later = {**ledger, "wall_impulse": np.array([1.0, 1.0, 1.0, 1.0, 1.0, 53.0])}
+    assert rows_of(scene, make_frame(**known), make_frame(**known)) == []
+    later = {**known, "wall_impulse": np.array([1.0, 1.0, 1.0, 1.0, 1.0, 53.0])}
     # 52 N s on 52 m^2 in 2 s.
-    assert rows_of(scene, make_frame(time=2.0, **later), make_frame(**ledger)) == [("pressure", "0.5000 Pa")]
+    assert rows_of(scene, make_frame(time=2.0, **later), make_frame(**known)) == [("pressure", "0.5000 Pa")]
+
+
+def test_a_history_is_of_the_frames_before_and_forgets_the_oldest():
+    history = History()
+    for k in range(WINDOW + 5):
+        history = history.then(ledger(time=float(k)))
+    assert [passed.time for passed in history.ledgers] == [float(k) for k in range(5, WINDOW + 5)]
+    # What is not later, or not known, changes nothing; and no frame is in its own past.
+    assert history.then(ledger(time=3.0)) == history.then(None) == history
+    assert [passed.time for passed in history.up_to(ledger(time=7.0))] == [5.0, 6.0, 7.0]
 
 
 def test_energy_change_is_relative_to_the_parts_not_to_a_sum_that_may_vanish():
-    first = make_frame(kinetic_translational=2.0, potential=-2.0)
-    later = make_frame(kinetic_translational=2.0, potential=-1.0)
+    first = ledger(kinetic_translational=2.0, potential=-2.0)
+    later = ledger(kinetic_translational=2.0, potential=-1.0)
     assert energy_change(later, first) == pytest.approx(0.25)
-    nothing = make_frame(potential=0.0)
-    assert energy_change(nothing, nothing) == 0.0
+    assert energy_change(ledger(), ledger()) == 0.0
 
 
 @pytest.mark.parametrize("size", [(64, 64), (200, 120), (720, 1280), (1280, 720)])
 @pytest.mark.parametrize("dark", [True, False])
 def test_readout_stays_in_the_picture_and_in_its_corner(size, dark):
-    now = make_frame(10**6, 12345.678, impacts=1e9, potential=1.0)
+    now = make_frame(10**6, 12345.678, impacts=10**9, potential=1.0)
     changed, image = drawn(make_scene(size=size), now, make_frame(10**6, potential=3.0), dark)
     assert changed.any()
     if min(size) >= 700:
@@ -165,7 +185,7 @@ HEIGHT = {"shape": "sphere", "count": 1, "colour": "by_height"}
 @pytest.mark.parametrize("size", [(640, 360), (1280, 720), (480, 480), (360, 640)])
 def test_legends_touch_neither_the_readout_nor_each_other(size):
     both = make_header(2, np.array([0, 1]))
-    frame = make_frame(2, impacts=1.0, potential=1.0)
+    frame = make_frame(2, impacts=1, potential=1.0)
     groups = {"speed": [SPEED, SPEED], "both": [SPEED, HEIGHT]}
     shown = {
         (name, readout): drawn(make_scene(*group, size=size, readout=readout), frame, header=both)[0]
@@ -174,7 +194,7 @@ def test_legends_touch_neither_the_readout_nor_each_other(size):
     }
     readout = drawn(
         make_scene({**SPEED, "colour": "red", "colour_range": None}, size=size),
-        make_frame(1, impacts=1.0, potential=1.0),
+        make_frame(1, impacts=1, potential=1.0),
     )[0]
     for name, group in groups.items():
         legends = shown[name, True] & ~readout

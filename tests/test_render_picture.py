@@ -6,8 +6,9 @@ import pytest
 from particlesim.core.constants import SPHERE
 from particlesim.geometry import shapes
 from particlesim.rendering import Renderer
+from particlesim.rendering.look import look_of
 from particlesim.scene import Scene
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.trajectory.frames import Frame, Header
 
 WIDTH, HEIGHT = 320, 240
 EYE = np.array([10.0, 0.0, 0.0])
@@ -29,7 +30,7 @@ def make_frame(position, orientation=None):
     position = np.asarray(position, dtype=float)
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(position), 1)) if orientation is None else np.asarray(orientation)
     still = np.zeros_like(position)
-    return Frame(0.0, position, turn, still, still, still.astype(int), np.zeros(len(position), int), {})
+    return Frame(0.0, position, turn, still, still, still.astype(int), np.zeros(len(position), int))
 
 
 def make_header(shape_list, number, size):
@@ -38,11 +39,11 @@ def make_header(shape_list, number, size):
     return Header("", tuple(shape_list), number, size, number, np.ones(len(size)), np.ones((len(size), 3)))
 
 
-def draw(scene, shape_list, size, frame, cells=None):
+def draw(scene, shape_list, size, frame):
     """The picture of one particle a group, each of its own shape."""
-    number = np.arange(len(size))
-    with Renderer(scene, make_header(shape_list, number, size)) as renderer:
-        return renderer.draw(frame, cells)
+    header = make_header(shape_list, np.arange(len(size)), size)
+    with Renderer(look_of(scene, header, frame)) as renderer:
+        return renderer.draw(frame)
 
 
 def covered(image, background=(255, 255, 255)):
@@ -208,8 +209,7 @@ def test_box_edges_and_cells_are_drawn_over_nothing_but_background():
     frame = make_frame([(0.0, 0.0, 0.0)])
     bare = draw(plain, [shapes.sphere()], [1.0], frame).astype(int)
     boxed = draw(make_scene("red", box=True), [shapes.sphere()], [1.0], frame).astype(int)
-    cells = np.array([[-2.0, -2.0, -2.0]]), np.array([[2.0, 2.0, 2.0]]), np.array([2])
-    celled = draw(plain, [shapes.sphere()], [1.0], frame, cells).astype(int)
+    celled = draw(make_scene("red", cells=True), [shapes.sphere()], [1.0], frame).astype(int)
     for image in (boxed, celled):
         changed = np.any(image != bare, axis=2)
         assert 200 < changed.sum() < 0.1 * changed.size
@@ -223,7 +223,8 @@ def test_frames_follow_the_particles_and_repeat_to_the_bit():
     header = make_header(kinds, number, rng.uniform(0.3, 0.6, 60))
     scene = make_scene("red", "green", "blue", world={"boundary": "wall"}, box=True, readout=True)
     frames = [make_frame(rng.uniform(-2.5, 2.5, (60, 3))) for _ in range(2)]
-    with Renderer(scene, header) as renderer, Renderer(scene, header) as other:
+    look = look_of(scene, header, frames[0])
+    with Renderer(look) as renderer, Renderer(look) as other:
         first, second, again = (renderer.draw(frame) for frame in (*frames, frames[0]))
         assert first.shape == (HEIGHT, WIDTH, 3) and first.dtype == np.uint8
         assert np.array_equal(first, again) and not np.array_equal(first, second)

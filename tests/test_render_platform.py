@@ -13,16 +13,17 @@ DRAW = """
 import numpy as np
 from particlesim.geometry import shapes
 from particlesim.rendering import Renderer, RenderError
+from particlesim.rendering.look import look_of
 from particlesim.scene import Scene
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.trajectory.frames import Frame, Header
 scene = Scene(world={"size": (2, 2, 2)}, particles=[{"shape": "sphere", "count": 1}],
               movie={"resolution": (128, 96)})
 header = Header("", (shapes.sphere(),), np.zeros(1, int), np.ones(1), np.zeros(1, int),
                 np.ones(1), np.ones((1, 3)))
 zero = np.zeros((1, 3))
-frame = Frame(0.0, zero, np.array([[1.0, 0, 0, 0]]), zero, zero, zero.astype(int), np.zeros(1, int), {})
+frame = Frame(0.0, zero, np.array([[1.0, 0, 0, 0]]), zero, zero, zero.astype(int), np.zeros(1, int))
 try:
-    with Renderer(scene, header) as renderer:
+    with Renderer(look_of(scene, header, frame)) as renderer:
         print(renderer.draw(frame).tobytes().hex())
 except RenderError as error:
     print(error)

@@ -6,6 +6,7 @@ import pytest
 from particlesim.core.parallel import use_threads
 from particlesim.geometry import shapes
 from particlesim.rendering import Renderer
+from particlesim.rendering.look import look_of
 from particlesim.rendering.quality import PRESETS
 from particlesim.scene import Scene
 from tests.test_render_picture import edge, make_frame, make_header
@@ -28,7 +29,7 @@ def picture(quality, count=40, background="#ffffff"):
     turn /= np.linalg.norm(turn, axis=1, keepdims=True)
     frame = make_frame(random.uniform(-2.2, 2.2, (count, 3)), turn)
     header = make_header(KINDS, np.arange(count) % 3, random.uniform(0.5, 1.2, count))
-    with Renderer(scene, header) as renderer:
+    with Renderer(look_of(scene, header, frame)) as renderer:
         return renderer.draw(frame).astype(int)
 
 
@@ -83,8 +84,9 @@ def silhouette(quality):
         camera={"kind": "look-at", "position": (60.0, 0.0, 0.0), "field_of_view": 6.0},
         show={"box": False, "readout": False},
     )
-    with Renderer(scene, make_header([shapes.sphere()], np.array([0]), [4.0])) as renderer:
-        return 1.0 - renderer.draw(make_frame([(0.0, 0.0, 0.0)]))[..., 2] / 255.0
+    header, frame = make_header([shapes.sphere()], np.array([0]), [4.0]), make_frame([(0.0, 0.0, 0.0)])
+    with Renderer(look_of(scene, header, frame)) as renderer:
+        return 1.0 - renderer.draw(frame)[..., 2] / 255.0
 
 
 def test_edges_are_sharp_in_a_draft_and_soft_above():

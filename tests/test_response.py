@@ -152,7 +152,7 @@ def test_nothing_is_inside_anything_else_or_outside_the_box():
     sim = Simulation(gas(seed=3))
     for _ in range(20):
         sim.run(duration=1 / 30)
-        assert sim.ledger.largest_overlap < 0.02 * 0.3
+        assert sim.largest_overlap() < 0.02 * 0.3
     reach = sim.particles.inradius[:, None]
     assert (np.abs(sim.particles.position) + reach <= 1.25 + 0.02 * 0.3).all()
 

@@ -19,10 +19,10 @@ SHAPES = ("sphere", "cube", "pyramid")
 def followed(what, duration, pieces):
     """The simulation after ``duration``, and the ledgers at the start and after each of so many pieces of it."""
     sim = Simulation(what)
-    ledgers = [sim.ledger]
+    ledgers = [sim.frame().ledger]
     for _ in range(pieces):
         sim.run(duration=duration / pieces)
-        ledgers.append(sim.ledger)
+        ledgers.append(sim.frame().ledger)
     return sim, ledgers
 
 

@@ -195,5 +195,5 @@ def test_who_is_deflected_no_more_is_compared_with_those_who_were_meanwhile():
     halves.step(0.0018)
     for simulation in (whole, halves):
         assert simulation.ledger.impacts == 7
-        assert simulation.ledger.largest_overlap == 0.0
+        assert simulation.largest_overlap() == 0.0
     assert np.abs(whole.particles.position - halves.particles.position).max() < 1e-12

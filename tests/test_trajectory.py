@@ -1,11 +1,14 @@
 """Trajectories in GSD files."""
 
+from dataclasses import fields
+
 import gsd.hoomd
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from particlesim.simulation.simulation import Simulation
+from particlesim.trajectory.frames import Ledger
 from particlesim.trajectory.gsd_file import Trajectory, TrajectoryError, TrajectoryWriter
 from tests.worlds import gas, scene
 
@@ -38,8 +41,9 @@ def test_what_is_written_is_read(run):
                 assert np.allclose(getattr(read, name), getattr(written, name), rtol=1e-6, atol=1e-5), name
             assert np.array_equal(read.image, written.image)
             assert np.array_equal(read.impacts, written.impacts)
-            assert read.ledger["impacts"] == written.ledger["impacts"]
-            assert np.array_equal(read.ledger["momentum"], written.ledger["momentum"])
+            for field in fields(Ledger):
+                assert np.array_equal(getattr(read.ledger, field.name), getattr(written.ledger, field.name)), field.name
+                assert type(getattr(read.ledger, field.name)) is type(getattr(written.ledger, field.name)), field.name
 
 
 def test_other_programs_find_the_hoomd_schema(run):

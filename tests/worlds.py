@@ -5,9 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from particlesim.scene import Scene
 from particlesim.scene.file import load_scene
 from particlesim.scene.overrides import scaled
+from particlesim.trajectory.frames import Ledger
 
 # A scene of more particles than this is tested by a twin with as many.
 MOST = 4000
@@ -38,3 +41,11 @@ def quick_twin(path: Path) -> Scene:
     """The scene of a file, with fewer and larger particles if it has very many."""
     loaded = load_scene(path)
     return loaded if loaded.number <= MOST else scaled(loaded, MOST / loaded.number)
+
+
+def ledger(**values: Any) -> Ledger:
+    """A ledger with these values and nothing else in it."""
+    energies = dict.fromkeys(("kinetic_translational", "kinetic_rotational", "potential", "virial"), 0.0)
+    counts = dict.fromkeys(("steps", "impacts", "pairs_tested", "candidate_pairs", "unresolved"), 0)
+    vectors = {"momentum": np.zeros(3), "angular_momentum": np.zeros(3), "wall_impulse": np.zeros(6)}
+    return Ledger(**{"time": 0.0, "time_step": 0.0, **energies, **counts, **vectors, **values})

@@ -6,6 +6,7 @@ Each measurement is made in a process of its own: two libraries that open OpenGL
 from __future__ import annotations
 
 import importlib.util
+import itertools
 import json
 import math
 import multiprocessing
@@ -24,7 +25,7 @@ from particlesim.core.atomic_write import atomic_write
 from particlesim.geometry.shapes import CATALOGUE
 from particlesim.rendering import RenderError
 from particlesim.scene import Scene
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.trajectory.frames import Frame, Header
 
 COUNTS = 1_000, 10_000, 100_000
 LARGE = 1_000_000
@@ -145,6 +146,7 @@ def measured(kind: str, count: int, name: str) -> Drawn:
 def own_pictures(drawn: Crowd) -> Iterator[np.ndarray]:
     """Picture after picture as movies have them: with shadows, smooth edges, and colours by speed."""
     from particlesim.rendering import Renderer  # noqa: PLC0415  (brings kernels)
+    from particlesim.rendering.look import look_of  # noqa: PLC0415
 
     scene = Scene.model_validate(
         {
@@ -159,12 +161,12 @@ def own_pictures(drawn: Crowd) -> Iterator[np.ndarray]:
     kinds = tuple(CATALOGUE[shape]() for shape in drawn.shapes)
     header = Header("", kinds, drawn.number, drawn.size, drawn.number, np.ones(n), np.ones((n, 3)))
     still, home, unhurt = np.zeros((n, 3)), np.zeros((n, 3), dtype=np.int64), np.zeros(n, dtype=np.int64)
-    with Renderer(scene, header) as renderer:
-        k = 0
-        while True:
-            position = _moved(drawn, k)
-            yield renderer.draw(Frame(_TURN * k, position, drawn.orientation, drawn.velocity, still, home, unhurt, {}))
-            k += 1
+
+    def frame(k: int) -> Frame:
+        return Frame(_TURN * k, _moved(drawn, k), drawn.orientation, drawn.velocity, still, home, unhurt)
+
+    with Renderer(look_of(scene, header, frame(0))) as renderer:
+        yield from (renderer.draw(frame(k)) for k in itertools.count())
 
 
 def _moved(drawn: Crowd, k: int) -> np.ndarray:

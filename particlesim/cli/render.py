@@ -86,8 +86,7 @@ def _opened(source: Path, wishes: Wishes) -> Iterator[tuple[Scene | Trajectory, 
         scene = wished_scene(load(source), wishes, of_trajectory=False)
         yield scene, scene, scene.frames
         return
-    from particlesim.jobs.frame_source import scene_of  # noqa: PLC0415
     from particlesim.trajectory.gsd_file import Trajectory  # noqa: PLC0415
 
     with Trajectory(source) as trajectory:
-        yield trajectory, wished_scene(scene_of(trajectory), wishes, of_trajectory=True), len(trajectory)
+        yield trajectory, wished_scene(trajectory.scene, wishes, of_trajectory=True), len(trajectory)

@@ -1,9 +1,8 @@
-"""What passes before the camera: the frames of a scene as it is simulated, or of a trajectory as they are read."""
+"""Where frames come from: a scene as it is simulated, or a trajectory as it is read."""
 
 from __future__ import annotations
 
 import bisect
-import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,15 +10,15 @@ from typing import NamedTuple
 
 from particlesim.core.jit import is_compiled
 from particlesim.scene import Scene
-from particlesim.scene.file import parse_scene
 from particlesim.simulation.simulation import Simulation
-from particlesim.trajectory.gsd_file import Frame, Header, Trajectory
+from particlesim.trajectory.frames import Frame, Header
+from particlesim.trajectory.gsd_file import Trajectory
 
 # Called with what is going on, how many frames are done, and how many there will be.
 Progress = Callable[[str, int, int], None]
 
 
-class Reel(NamedTuple):
+class FrameSource(NamedTuple):
     """A scene, what stays the same about its particles, and their frames."""
 
     scene: Scene
@@ -27,7 +26,7 @@ class Reel(NamedTuple):
     first: Frame  # of the whole run: what scales and changes refer to
     frames: Iterator[tuple[int, Frame]]  # with their numbers, all that are simulated or read
     total: int  # how many there are of them
-    wanted: range  # numbers of those that pictures are wanted of
+    wanted: range  # numbers of those that are to be drawn
     phase: str  # what takes the time until the next
 
 
@@ -41,7 +40,9 @@ def opened(source: Scene | Trajectory | str | Path) -> Iterator[Scene | Trajecto
         yield trajectory
 
 
-def reel_of(source: Scene | Trajectory, wanted: range | None, threads: int | None, progress: Progress | None) -> Reel:
+def frame_source(
+    source: Scene | Trajectory, wanted: range | None, threads: int | None, progress: Progress | None
+) -> FrameSource:
     """All frames of a scene up to the last wanted one; of a trajectory those alone. None stands for all.
 
     ValueError for frames that are not there.
@@ -49,19 +50,21 @@ def reel_of(source: Scene | Trajectory, wanted: range | None, threads: int | Non
     if isinstance(source, Trajectory):
         wanted = _among(wanted, len(source))
         stored = ((k, source[k]) for k in wanted)
-        return Reel(scene_of(source), source.header, source[0], stored, len(wanted), wanted, "reading")
+        return FrameSource(source.scene, source.header, source[0], stored, len(wanted), wanted, "reading")
     wanted = _among(wanted, source.frames)
     simulation = start(source, threads, progress)
     total = max(wanted) + 1
     frames = frames_of(simulation, total)
-    return Reel(source, simulation.header, simulation.frame(), frames, total, wanted, "simulating")
+    return FrameSource(source, simulation.header, simulation.frame(), frames, total, wanted, "simulating")
 
 
-def reel_until(time: float, source: Scene | Trajectory, threads: int | None, progress: Progress | None) -> Reel:
+def frame_source_until(
+    time: float, source: Scene | Trajectory, threads: int | None, progress: Progress | None
+) -> FrameSource:
     """The frames of a scene up to ``time`` [s] and the particles at that very time; or a trajectory's nearest frame."""
     if isinstance(source, Trajectory):
         nearest = _nearest(source, time)
-        return reel_of(source, range(nearest, nearest + 1), threads, progress)
+        return frame_source(source, range(nearest, nearest + 1), threads, progress)
     simulation = start(source, threads, progress)
     before = source.frame_at(time) + 1
 
@@ -71,12 +74,7 @@ def reel_until(time: float, source: Scene | Trajectory, threads: int | None, pro
         yield before, simulation.frame()
 
     last = range(before, before + 1)
-    return Reel(source, simulation.header, simulation.frame(), frames(), before + 1, last, "simulating")
-
-
-def scene_of(trajectory: Trajectory) -> Scene:
-    """The scene that a trajectory is of. SceneError if this version cannot read it."""
-    return parse_scene(json.loads(trajectory.header.scene_json))
+    return FrameSource(source, simulation.header, simulation.frame(), frames(), before + 1, last, "simulating")
 
 
 def start(scene: Scene, threads: int | None, progress: Progress | None) -> Simulation:
@@ -97,7 +95,7 @@ def frames_of(simulation: Simulation, total: int) -> Iterator[tuple[int, Frame]]
 
 
 def tell(progress: Progress | None, phase: str, done: int, total: int) -> None:
-    """Say how far the work is to whoever wants to know."""
+    """Say how far the work is, if it is to be said."""
     if progress is not None:
         progress(phase, done, total)
 

@@ -10,14 +10,25 @@ from typing import TypeVar
 
 import numpy as np
 
-from particlesim.jobs.frame_source import Progress, Reel, frames_of, opened, reel_of, reel_until, start, tell
+from particlesim.jobs.frame_source import (
+    FrameSource,
+    Progress,
+    frame_source,
+    frame_source_until,
+    frames_of,
+    opened,
+    start,
+    tell,
+)
 from particlesim.jobs.summary import Summary
 from particlesim.rendering import Renderer, write_image, write_movie
-from particlesim.rendering.octree_cells import octree_cells
+from particlesim.rendering.hud.history import History
+from particlesim.rendering.look import look_of
 from particlesim.rendering.shading.colour import encoded
 from particlesim.rendering.video.fade import faded, strength
 from particlesim.scene import Scene
-from particlesim.trajectory.gsd_file import Frame, Header, Trajectory, TrajectoryWriter
+from particlesim.trajectory.frames import Frame, Header
+from particlesim.trajectory.gsd_file import Trajectory, TrajectoryWriter
 
 _T = TypeVar("_T")
 
@@ -56,13 +67,13 @@ def render(
     if this machine cannot draw or encode; ValueError for frames that are not there.
     """
     with opened(source) as movable:
-        reel = reel_of(movable, frames, threads, progress)
-        scene = look or reel.scene
-        with _Studio(reel, scene, progress) as studio:
-            times = write_movie(path, studio.images(), scene.movie.fps, scene.movie.size, scene.movie.crf)
-            studio.summary.seconds["encoding"] = times.encoding
-            write_image(Path(path).with_suffix(".png"), studio.poster)
-    return studio.summary
+        chosen = frame_source(movable, frames, threads, progress)
+        scene = look or chosen.scene
+        with MovieJob(chosen, scene, progress) as job:
+            times = write_movie(path, job.images(), scene.movie.fps, scene.movie.size, scene.movie.crf)
+            job.summary.seconds["encoding"] = times.encoding
+            write_image(Path(path).with_suffix(".png"), job.poster)
+    return job.summary
 
 
 def still(
@@ -79,27 +90,28 @@ def still(
     Otherwise like ``render``.
     """
     with opened(source) as movable:
-        reel = reel_until(time, movable, threads, progress)
-        with _Studio(reel, look or reel.scene, progress) as studio:
-            for _ in studio.images():
+        chosen = frame_source_until(time, movable, threads, progress)
+        with MovieJob(chosen, look or chosen.scene, progress) as job:
+            for _ in job.images():
                 pass
-            write_image(path, studio.poster)
-    return studio.summary
+            write_image(path, job.poster)
+    return job.summary
 
 
-class _Studio:
-    """Where pictures are taken of a reel, ``scene`` saying how. A context manager: it holds a Renderer.
+class MovieJob:
+    """Makes the pictures of the frames of a source, as ``scene`` says. A context manager: it holds a Renderer.
 
     ``summary``: what the frames that have passed amount to. RenderError if this machine cannot draw.
     """
 
-    def __init__(self, reel: Reel, scene: Scene, progress: Progress | None) -> None:
-        self._reel, self._scene, self._progress = reel, scene, progress
-        self._renderer = Renderer(scene, reel.header, reel.first)
-        self.summary = _summary(scene, reel.header)
+    def __init__(self, source: FrameSource, scene: Scene, progress: Progress | None) -> None:
+        self._source, self._movie, self._progress = source, scene.movie, progress
+        self._renderer = Renderer(look_of(scene, source.header, source.first))
+        self.summary = _summary(scene, source.header)
+        self._watch = _Stopwatch(self.summary)
         self.poster = np.zeros((0, 0, 3), dtype=np.uint8)  # of the movie that images() gives
 
-    def __enter__(self) -> _Studio:
+    def __enter__(self) -> MovieJob:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -107,26 +119,28 @@ class _Studio:
 
     def images(self) -> Iterator[np.ndarray]:
         """The pictures of the movie, (h, w, 3) uint8, with its fades; all frames are taken into account on the way."""
-        reel, movie, summary = self._reel, self._scene.movie, self.summary
-        watch = _Stopwatch(summary)
-        background, count = encoded(movie.background), len(reel.wanted)
-        for number, frame in watch.timed(reel.phase, reel.frames):
-            if number in reel.wanted:
-                with watch.running("drawing"):
-                    image = self._picture(frame)
-                # A third of the way in, things have begun to happen.
-                if summary.drawn == count // 3:
-                    self.poster = image
-                seen = strength(summary.drawn, count, movie.fade * movie.fps)
-                summary.drawn += 1
-                yield faded(image, seen, background)
-            summary.add(frame)
-            tell(self._progress, "rendering", summary.frames, reel.total)
+        movie, summary, count = self._movie, self.summary, len(self._source.wanted)
+        background = encoded(movie.background)
+        for frame, history in self._wanted():
+            with self._watch.running("drawing"):
+                image = self._renderer.draw(frame, history)
+            # A third of the way in, things have begun to happen.
+            if summary.drawn == count // 3:
+                self.poster = image
+            seen = strength(summary.drawn, count, movie.fade * movie.fps)
+            summary.drawn += 1
+            yield faded(image, seen, background)
 
-    def _picture(self, frame: Frame) -> np.ndarray:
-        """A frame as it looks, with the octree's cells if they are shown."""
-        cells = octree_cells(self._scene, self._reel.header, frame) if self._scene.show.cells else None
-        return self._renderer.draw(frame, cells)
+    def _wanted(self) -> Iterator[tuple[Frame, History]]:
+        """The frames to draw, each with what its readout needs of those drawn before it."""
+        source, summary = self._source, self.summary
+        history = History().then(source.first.ledger)
+        for number, frame in self._watch.timed(source.phase, source.frames):
+            if number in source.wanted:
+                yield frame, history
+                history = history.then(frame.ledger)
+            summary.add(frame)
+            tell(self._progress, "rendering", summary.frames, source.total)
 
 
 def _summary(scene: Scene, header: Header) -> Summary:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from particlesim.trajectory.gsd_file import Frame
+from particlesim.trajectory.frames import Frame, Ledger
 
 
 class Summary:
@@ -20,8 +20,8 @@ class Summary:
     def __init__(self, total_mass: float, gravity: Any, elastic: bool = True) -> None:
         self._mass, self._gravity = total_mass, np.asarray(gravity, dtype=np.float64)
         self.elastic = elastic
-        self._first: Frame | None = None
-        self._last: Frame | None = None
+        self._first: Ledger | None = None
+        self._last: Ledger | None = None
         self._largest_kinetic = self._largest_change = self._largest_gain = 0.0
         self._least = math.inf
         self.frames = 0
@@ -31,16 +31,18 @@ class Summary:
 
     def add(self, frame: Frame) -> None:
         """Take a frame into account."""
-        self._first = self._first or frame
-        self._last = frame
         self.frames += 1
-        self.largest_overlap = max(self.largest_overlap, frame.ledger["largest_overlap"])
-        kinetic = frame.ledger["kinetic_translational"] + frame.ledger["kinetic_rotational"]
-        self._largest_kinetic = max(self._largest_kinetic, kinetic)
-        energy = _energy(frame)
-        self._largest_change = max(self._largest_change, abs(energy - _energy(self._first)))
-        self._least = min(self._least, energy)
-        self._largest_gain = max(self._largest_gain, energy - self._least)
+        if frame.ledger is not None:
+            self._account(frame.ledger)
+
+    def _account(self, ledger: Ledger) -> None:
+        self._first = self._first or ledger
+        self._last = ledger
+        self.largest_overlap = max(self.largest_overlap, ledger.largest_overlap or 0.0)
+        self._largest_kinetic = max(self._largest_kinetic, ledger.kinetic)
+        self._largest_change = max(self._largest_change, abs(ledger.energy - self._first.energy))
+        self._least = min(self._least, ledger.energy)
+        self._largest_gain = max(self._largest_gain, ledger.energy - self._least)
 
     @property
     def simulated_seconds(self) -> float:
@@ -50,12 +52,12 @@ class Summary:
     @property
     def impacts(self) -> int:
         """Impacts up to the last frame."""
-        return int(self._last.ledger["impacts"]) if self._last else 0
+        return self._last.impacts if self._last else 0
 
     @property
     def unresolved(self) -> int:
         """Steps that ended while something still approached."""
-        return int(self._last.ledger["unresolved"]) if self._last else 0
+        return self._last.unresolved if self._last else 0
 
     @property
     def worst_energy_drift(self) -> float:
@@ -71,7 +73,7 @@ class Summary:
         return self._of_all(self._largest_change if self.elastic else self._largest_gain)
 
     def _of_all(self, energy: float) -> float:
-        scale = max(self._largest_kinetic, _energy(self._first) if self._first else 0.0)
+        scale = max(self._largest_kinetic, self._first.energy if self._first else 0.0)
         return energy / scale if scale else 0.0
 
     @property
@@ -79,14 +81,9 @@ class Summary:
         """Change of momentum that neither walls nor gravity account for, over the momentum of the fastest motion."""
         if not (self._first and self._last and self._largest_kinetic):
             return 0.0
-        first, last = self._first.ledger, self._last.ledger
-        given = last["wall_impulse"] - first["wall_impulse"]
+        first, last = self._first, self._last
+        given = last.wall_impulse - first.wall_impulse
         to_walls = np.array([given[1] - given[0], given[3] - given[2], given[5] - given[4]])
-        fallen = self._mass * self._gravity * (self._last.time - self._first.time)
-        error = last["momentum"] - first["momentum"] + to_walls - fallen
+        fallen = self._mass * self._gravity * (last.time - first.time)
+        error = last.momentum - first.momentum + to_walls - fallen
         return float(np.linalg.norm(error) / np.sqrt(2.0 * self._mass * self._largest_kinetic))
-
-
-def _energy(frame: Frame) -> float:
-    ledger = frame.ledger
-    return float(ledger["kinetic_translational"] + ledger["kinetic_rotational"] + ledger["potential"])

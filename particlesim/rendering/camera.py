@@ -8,7 +8,7 @@ import numpy as np
 
 from particlesim.scene import Scene
 from particlesim.scene.camera import FixedCamera, LookAtCamera, OrbitCamera, PathCamera
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.trajectory.frames import Frame, Header
 
 # The world fills at most this fraction of the picture's width and height.
 FILL = 0.92

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from particlesim.broad_phase import octree_leaves
 from particlesim.rendering.gl import geometry
 from particlesim.rendering.shading.colour import map_colours
 from particlesim.scene import Scene
 from particlesim.scene.world import Octree
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.trajectory.frames import Frame
 
 # Leaves at this depth or deeper have the last colour.
 _DEEPEST = 8
@@ -23,10 +24,8 @@ def cell_lines(lower: np.ndarray, upper: np.ndarray, depth: np.ndarray, width: f
     return geometry.lines(start.reshape(-1, 3), end.reshape(-1, 3), np.repeat(colour, 12, axis=0), width)
 
 
-def octree_cells(scene: Scene, header: Header, frame: Frame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def octree_cells(scene: Scene, frame: Frame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Lower and upper corners (k, 3) [m] and depths (k,) of the octree's leaves over the particles of a frame."""
-    from particlesim.broad_phase import octree_leaves  # noqa: PLC0415  (numba is slow to import)
-
     chosen = scene.solver.broad_phase
     octree = chosen if isinstance(chosen, Octree) else Octree(kind="octree")
     upper = 0.5 * np.asarray(scene.world.size)

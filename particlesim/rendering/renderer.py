@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
-from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.rendering.camera import Box, View, subject_box, view_at
+from particlesim.rendering.camera import View, view_at
 from particlesim.rendering.gl import geometry, platform
+from particlesim.rendering.hud.history import History
 from particlesim.rendering.hud.overlay import Overlay
-from particlesim.rendering.octree_cells import cell_lines
+from particlesim.rendering.look import Look
+from particlesim.rendering.octree_cells import cell_lines, octree_cells
 from particlesim.rendering.quality import PRESETS
 from particlesim.rendering.shading.ambient_occlusion import Sky
-from particlesim.rendering.shading.colour import ParticleColours
-from particlesim.rendering.shading.environment import Surroundings
+from particlesim.rendering.shading.environment import Environment
 from particlesim.rendering.shading.floor import Ground
 from particlesim.rendering.shading.fxaa import smooth_edges
 from particlesim.rendering.shading.lighting import key_light
@@ -25,50 +25,40 @@ from particlesim.rendering.visibility.instances import Cast, cast_of
 from particlesim.rendering.visibility.occlusion_clusters import Groups, grouped
 from particlesim.rendering.visibility.projection import Outlook
 from particlesim.rendering.visibility.rasterise import Sight, look
-from particlesim.scene import Scene
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.trajectory.frames import Frame
 
 # Widths of lines [pixels] in a picture 720 pixels high: the edges of the world, and those of the octree's cells.
 _BOX_LINE = 1.3
 _CELL_LINE = 0.8
 
 
-class _Settled(NamedTuple):
-    """What the first frame settles for all of a movie."""
-
-    colours: ParticleColours
-    subject: Box
-    overlay: Overlay
-
-
 class Renderer:
-    """Draws one movie's frames, all with the same scales. A context manager: it holds an OpenGL context.
+    """Draws the frames of one movie, in any order. A context manager: it holds an OpenGL context.
 
-    ``first`` is the frame that the readout's energy and the scale of speeds refer to, by default the first drawn.
     RenderError if this machine cannot draw.
     """
 
-    def __init__(self, scene: Scene, header: Header, first: Frame | None = None) -> None:
+    def __init__(self, look: Look) -> None:
         found = platform.choose()
         self._bridge = bridge = platform.open_bridge(found)
-        self._scene, self._header, self._first = scene, header, first
-        self._settled: _Settled | None = None
+        self._look, scene = look, look.scene
         self._beside = ThreadPoolExecutor(1)
         self._quality = quality = PRESETS[scene.movie.quality]
         self._size = scene.movie.size
         self._drawn_size = (quality.samples * self._size[0], quality.samples * self._size[1])
-        self._about = about = Surroundings(scene)
-        self._bodies = bodies = bodies_of(header)
+        self._environment = environment = Environment(scene)
+        self._overlay = Overlay(look, environment.dark)
+        self._bodies = bodies = bodies_of(look.header)
         self._light = key_light(scene, round(quality.shadow * self._size[1]))
         self._sky = Sky(np.asarray(scene.world.size), bodies.outer) if quality.sky else None
-        shaded = about.has_floor and quality.sky
-        self._ground = Ground(*about.floor, bodies.inner, bodies.outer) if shaded else None
+        shaded = environment.has_floor and quality.sky
+        self._ground = Ground(*environment.floor, bodies.inner, bodies.outer) if shaded else None
         tile = np.array([(0.5 * TILE, 0.5 * TILE, 0.0)])
         self._spheres, self._hulls = bridge.Layer(bridge.SPHERES, tile), bridge.Layer(bridge.HULLS, tile)
-        floor = [bridge.Layer(bridge.FLOOR, geometry.SQUARE)] if about.has_floor else []
+        floor = [bridge.Layer(bridge.FLOOR, geometry.SQUARE)] if environment.has_floor else []
         self._lines = bridge.Layer(bridge.LINE, geometry.STRIP)
         layers = [self._spheres, self._hulls, *floor, self._lines]
-        self._canvas = bridge.Canvas(found, self._size, layers, about.background, quality.samples)
+        self._canvas = bridge.Canvas(found, self._size, layers, environment.background, quality.samples)
 
     def __enter__(self) -> Renderer:
         return self
@@ -83,21 +73,29 @@ class Renderer:
         self._beside.shutdown()
         self._canvas.close()
 
-    def draw(self, frame: Frame, cells: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None) -> np.ndarray:
-        """The picture of a frame, (height, width, 3) uint8 sRGB.
+    def draw(self, frame: Frame, history: History | None = None) -> np.ndarray:
+        """The picture of a frame: a function of the look, the frame and its history, and of nothing drawn before.
 
-        ``cells``: lower (k, 3) and upper (k, 3) corners [m] and depth (k,) of the octree's leaves, drawn as lines.
+        Parameters
+        ----------
+        frame
+            The particles at one time.
+        history
+            What has passed before the frame, for readouts over time; without it they are left out.
+
+        Returns
+        -------
+        (height, width, 3) uint8, sRGB.
         """
-        self._settled = settled = self._settled or self._settle(self._first or frame)
-        view = view_at(self._scene, frame.time, self._size[0] / self._size[1], settled.subject)
-        cast = cast_of(self._scene, self._header, frame, self._bodies)
+        view = view_at(self._look.scene, frame.time, self._size[0] / self._size[1], self._look.subject)
+        cast = cast_of(self._look.scene, self._look.header, frame, self._bodies)
         groups = grouped(cast.position, cast.bodies.outer)
         outlook = self._outlook(view)
         sight = look(outlook, cast.bodies, groups, cast.orientation)
         # While the light looks, what the camera saw is worked up: that leaves a core idle now and then.
         shadow = self._beside.submit(self._shadow_map, cast, groups)
-        first_row, surfaces = self._put_particles(frame, cast, settled.colours, outlook, sight)
-        self._put_lines(view, cells)
+        first_row, surfaces = self._put_particles(frame, cast, outlook, sight)
+        self._put_lines(view, frame)
         picture = self._bridge.Picture(
             view_block=self._view_block(view),
             shadow=shadow.result(),
@@ -108,47 +106,39 @@ class Renderer:
         drawn = self._canvas.draw(picture)
         # OpenGL's first row is the lowest, and it has a fourth channel.
         image = smooth_edges(drawn) if self._quality.smooth else np.ascontiguousarray(drawn[::-1, :, :3])
-        settled.overlay.draw(image, frame)
+        self._overlay.draw(image, frame, history or History())
         return image
-
-    def _settle(self, first: Frame) -> _Settled:
-        colours = ParticleColours(self._scene, self._header, first)
-        return _Settled(
-            colours=colours,
-            subject=subject_box(self._scene, self._header, first),
-            overlay=Overlay(self._scene, self._header, first, colours, self._about.dark),
-        )
 
     def _outlook(self, view: View) -> Outlook:
         slope = float(np.tan(0.5 * view.field_of_view))
         axes = view.pose[:3, :3].T * np.array([[1.0], [1.0], [-1.0]])
         return Outlook(axes, view.pose[:3, 3], False, 0.5 * self._drawn_size[1] / slope, self._drawn_size)
 
-    def _put_particles(
-        self, frame: Frame, cast: Cast, colours: ParticleColours, outlook: Outlook, sight: Sight
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _put_particles(self, frame: Frame, cast: Cast, outlook: Outlook, sight: Sight) -> tuple[np.ndarray, np.ndarray]:
         """Tiles into the layers of spheres and hulls; what is seen at each pixel, and its table (see Picture)."""
         surfaces = surfaces_of(sight, cast.bodies)
         self._spheres.put(TILE * np.argwhere(surfaces.balls)[:, ::-1])
         self._hulls.put(TILE * np.argwhere(surfaces.hulls)[:, ::-1])
-        paint = self._paint(frame, cast, colours, surfaces.seen)
+        paint = self._paint(frame, cast, surfaces.seen)
         return surfaces.first_row, table_of(surfaces, cast.bodies, outlook, cast.position, cast.orientation, paint)
 
-    def _paint(self, frame: Frame, cast: Cast, colours: ParticleColours, members: np.ndarray) -> np.ndarray:
+    def _paint(self, frame: Frame, cast: Cast, members: np.ndarray) -> np.ndarray:
         """Linear colour, and share of the sky's light, of some of the cast, (k, 4) float64."""
         sky = self._sky
         light = np.ones(len(members)) if sky is None else sky.light(cast.position, members, cast.whose)
-        return np.column_stack([colours(frame, cast.particles(members)), light])
+        return np.column_stack([self._look.colours(frame, cast.particles(members)), light])
 
     def _shadow_map(self, cast: Cast, groups: Groups) -> np.ndarray:
         """How close to the key light what it meets is, (h, w) float32 [m]."""
         return look(self._light.outlook, cast.bodies, groups, cast.orientation).close
 
-    def _put_lines(self, view: View, cells: tuple[np.ndarray, np.ndarray, np.ndarray] | None) -> None:
+    def _put_lines(self, view: View, frame: Frame) -> None:
+        """The edges of the world and, if they are shown, of the octree's cells."""
+        scene = self._look.scene
         width = self._quality.samples * max(1.0, self._size[1] / 720.0)
-        rows = [self._about.box_lines(view, _BOX_LINE * width)]
-        if cells is not None:
-            rows.insert(0, cell_lines(*cells, width=_CELL_LINE * width))
+        rows = [self._environment.box_lines(view, _BOX_LINE * width)]
+        if scene.show.cells:
+            rows.insert(0, cell_lines(*octree_cells(scene, frame), width=_CELL_LINE * width))
         self._lines.put(np.vstack(rows))
 
     def _view_block(self, view: View) -> np.ndarray:
@@ -168,13 +158,13 @@ class Renderer:
             (*eye, 0.0),
             (*self._light.towards, 0.0),
             (1.0 / self._light.pixels[0], 1.0 / self._light.pixels[1], *self._light.pixels),
-            *self._about.colour_rows(),
+            *self._environment.colour_rows(),
             (width, height, 1.0, -view.near),
             (*-back, 2.0 * slope / height),
             (*right, 0.0),
             (*up, 0.0),
             (slope * width / height, slope, 0.0, 0.0),
-            *self._about.place_rows(view),
+            *self._environment.place_rows(view),
         ]
         matrices = [(projection @ turn).T.ravel(), self._light.matrix(eye).T.ravel()]  # by columns, as OpenGL has them
         return np.concatenate([*matrices, np.ravel(rows)], dtype=np.float32, casting="same_kind")

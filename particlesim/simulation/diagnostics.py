@@ -2,52 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
-
 import numpy as np
 
 from particlesim.core.jit import kernel
 from particlesim.core.math3d import add, axpy, cross, dot, load_vec3, scale, store_vec3, to_vec3
 from particlesim.model.free_motion import particle_spin
-
-
-@dataclass(frozen=True)
-class Ledger:
-    """Sums over all particles at one time, and counts since the start.
-
-    Energies [J], momentum [kg m/s], angular momentum about the origin [kg m^2/s]; both vectors (3,).
-    """
-
-    time: float  # [s]
-    time_step: float  # the last one [s]
-    steps: int
-    kinetic_translational: float
-    kinetic_rotational: float
-    potential: float  # in the field of gravity, zero at the corner of the world that it points to
-    momentum: np.ndarray
-    angular_momentum: np.ndarray
-    impacts: int
-    pairs_tested: int  # boxes compared by the broad phase
-    candidate_pairs: int  # pairs it handed to the narrow phase
-    unresolved: int  # stretches of time in which more happened than was worked through (see MAX_IMPACTS)
-    virial: float  # sum of r_ij . impulse over pair impacts [J s]
-    wall_impulse: np.ndarray  # (6,) given to the walls -x, +x, -y, +y, -z, +z along their outward normals [N s]
-    largest_overlap: float  # of two particles, or of a particle and a wall, at this time [m]
-
-    @property
-    def kinetic(self) -> float:
-        """Translational and rotational kinetic energy [J]."""
-        return self.kinetic_translational + self.kinetic_rotational
-
-    @property
-    def energy(self) -> float:
-        """Kinetic and potential energy [J]."""
-        return self.kinetic + self.potential
-
-    def row(self) -> dict[str, Any]:
-        """Everything by name, as a trajectory stores it."""
-        return asdict(self)
 
 
 @kernel

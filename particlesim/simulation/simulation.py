@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,8 +17,8 @@ from particlesim.model.free_motion import spins
 from particlesim.model.touching import deepest_overlap
 from particlesim.scene import Scene
 from particlesim.setup.build import build
-from particlesim.simulation.diagnostics import Ledger, sums
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.simulation.diagnostics import sums
+from particlesim.trajectory.frames import Frame, Header, Ledger
 
 
 class SimulationError(RuntimeError):
@@ -120,10 +121,11 @@ class Simulation:
             unresolved=counts.unresolved,
             virial=counts.virial,
             wall_impulse=counts.wall_impulse.copy(),
-            largest_overlap=float(
-                deepest_overlap(self.table, self.world, self.constants, self.state, self._flight.pairs)
-            ),
         )
+
+    def largest_overlap(self) -> float:
+        """The largest overlap of two particles, or of a particle and a wall, now [m]."""
+        return float(deepest_overlap(self.table, self.world, self.constants, self.state, self._flight.pairs))
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -148,7 +150,7 @@ class Simulation:
             angular_momentum=state.angular_momentum.copy(),
             image=state.image.copy(),
             impacts=self._flight.counts.each.copy(),
-            ledger=self.ledger.row(),
+            ledger=replace(self.ledger, largest_overlap=self.largest_overlap()),
         )
 
     def state_hash(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.core.constants import SPHERE
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.trajectory.frames import Frame, Header
 
 
 def frame_boxes(header: Header, frame: Frame) -> tuple[np.ndarray, np.ndarray]:

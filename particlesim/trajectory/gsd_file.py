@@ -8,9 +8,10 @@ the shape and size of every particle, and the ledger of every frame.
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import fields
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -21,6 +22,9 @@ import numpy as np
 from particlesim.core.atomic_write import atomic_write
 from particlesim.core.constants import SPHERE
 from particlesim.geometry.shapes import Shape, hull, sphere
+from particlesim.scene import Scene
+from particlesim.scene.file import parse_scene
+from particlesim.trajectory.frames import Frame, Header, Ledger
 
 # Other programs draw a shape for each type and do not scale it. Groups of more sizes than this get that many types,
 # evenly spread; the exact sizes are in the file as well.
@@ -28,6 +32,7 @@ _MAX_SIZES = 64
 
 # GSD stores names of types in fixed-width fields and text as bytes.
 _LOG = "particlesim/"
+_LEDGER = _LOG + "ledger/"
 
 # Under this prefix OVITO finds quantities of the particles that the schema does not have.
 _IMPACTS = "particles/impacts"
@@ -37,53 +42,12 @@ class TrajectoryError(ValueError):
     """A file that is not a trajectory of ours; the message is one line."""
 
 
-@dataclass(frozen=True)
-class Header:
-    """What stays the same from frame to frame.
-
-    ``scene_json``: the scene as JSON. ``shapes``: the shapes of size 1 that occur. Arrays (n,): ``shape`` index
-    into ``shapes``, ``size`` the factor on it, ``group`` the entry of the scene's particles, ``mass`` [kg].
-    ``inertia`` (n, 3): principal moments [kg m^2].
-    """
-
-    scene_json: str
-    shapes: tuple[Shape, ...]
-    shape: np.ndarray
-    size: np.ndarray
-    group: np.ndarray
-    mass: np.ndarray
-    inertia: np.ndarray
-
-    @property
-    def radius(self) -> np.ndarray:
-        """Of the bounding spheres, (n,) [m]."""
-        return np.array([shape.radius for shape in self.shapes])[self.shape] * self.size
-
-
-@dataclass(frozen=True)
-class Frame:
-    """The particles at one time [s].
-
-    ``position`` (n, 3) [m], ``orientation`` (n, 4) quaternions (w, x, y, z) body to world, ``velocity`` (n, 3) [m/s],
-    ``angular_momentum`` (n, 3) about the centroids, world axes [kg m^2/s], ``image`` (n, 3) turns round a periodic
-    world, ``impacts`` (n,) of each since the start; ``ledger`` numbers and vectors by name (see Ledger).
-    """
-
-    time: float
-    position: np.ndarray
-    orientation: np.ndarray
-    velocity: np.ndarray
-    angular_momentum: np.ndarray
-    image: np.ndarray
-    impacts: np.ndarray
-    ledger: dict[str, Any]
-
-
 class TrajectoryWriter:
     """Writes frames to a GSD file, which appears when the ``with`` block ends well, and not otherwise."""
 
     def __init__(self, path: str | Path, header: Header) -> None:
         self._header = header
+        self._box = [*json.loads(header.scene_json)["world"]["size"], 0.0, 0.0, 0.0]
         self._types, self._type_of = _display_types(header)
         self._files = contextlib.ExitStack()
         hidden = self._files.enter_context(atomic_write(path))
@@ -103,7 +67,7 @@ class TrajectoryWriter:
         header = self._header
         out = gsd.hoomd.Frame()
         out.configuration.step = self._count
-        out.configuration.box = [*json.loads(header.scene_json)["world"]["size"], 0.0, 0.0, 0.0]
+        out.configuration.box = self._box
         particles = out.particles
         particles.N = len(header.shape)
         particles.position = frame.position.astype(np.float32)
@@ -121,8 +85,7 @@ class TrajectoryWriter:
             out.log.update(_header_log(header))
         out.log[_IMPACTS] = frame.impacts.astype(np.uint32)
         out.log[_LOG + "time"] = np.array([frame.time])
-        for name, value in frame.ledger.items():
-            out.log[f"{_LOG}ledger/{name}"] = np.atleast_1d(np.asarray(value))
+        out.log.update(_ledger_log(frame.ledger))
         self._file.append(out)
         self._count += 1
 
@@ -161,6 +124,11 @@ class Trajectory:
     def __iter__(self) -> Iterator[Frame]:
         return (self[k] for k in range(len(self)))
 
+    @functools.cached_property
+    def scene(self) -> Scene:
+        """The scene that the trajectory is of. SceneError if this version cannot read it."""
+        return parse_scene(json.loads(self.header.scene_json))
+
     def time(self, k: int) -> float:
         """The time of frame ``k`` [s]."""
         return float(self._file[k].log[_LOG + "time"][0])
@@ -169,11 +137,6 @@ class Trajectory:
         """Frame ``k``, 0 the first; positions and motion as the file stores them, in single precision."""
         stored = self._file[k]
         particles, log = stored.particles, stored.log
-        ledger = {
-            name.removeprefix(_LOG + "ledger/"): value[0] if len(value) == 1 else value
-            for name, value in log.items()
-            if name.startswith(_LOG + "ledger/")
-        }
         orientation = particles.orientation.astype(np.float64)
         return Frame(
             time=float(log[_LOG + "time"][0]),
@@ -183,7 +146,7 @@ class Trajectory:
             angular_momentum=_world_momentum(particles.angmom.astype(np.float64), orientation),
             image=particles.image.astype(np.int64),
             impacts=log[_IMPACTS].astype(np.int64),
-            ledger=ledger,
+            ledger=_read_ledger(log),
         )
 
 
@@ -247,6 +210,24 @@ def _read_header(first: Any) -> Header:
         mass=first.particles.mass.astype(np.float64),
         inertia=first.particles.moment_inertia.astype(np.float64),
     )
+
+
+def _ledger_log(ledger: Ledger | None) -> dict[str, np.ndarray]:
+    """What is known of a ledger, each field under its name."""
+    if ledger is None:
+        return {}
+    values = {field.name: getattr(ledger, field.name) for field in fields(Ledger)}
+    return {_LEDGER + name: np.atleast_1d(value) for name, value in values.items() if value is not None}
+
+
+def _read_ledger(log: dict[str, np.ndarray]) -> Ledger:
+    """The ledger of a frame: of each field as many numbers as were written, one as a plain number."""
+    names = [field.name for field in fields(Ledger) if _LEDGER + field.name in log]
+    return Ledger(**{name: _plain(log[_LEDGER + name]) for name in names})
+
+
+def _plain(value: np.ndarray) -> Any:
+    return value[0].item() if len(value) == 1 else value
 
 
 def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from particlesim.rendering.shading.colour import PALETTE, ParticleColours, encod
 from particlesim.rendering.shading.fields import Field, figures
 from particlesim.scene import Scene
 from particlesim.scene.groups import FIELDS
-from particlesim.trajectory.gsd_file import Header
+from particlesim.trajectory.frames import Header
 
 # Width of a scale, height of its bar and of the marks below it, and edge of a swatch, in heights of letters.
 _SCALE, _BAR, _MARK, _SWATCH = 11.0, 0.7, 0.25, 0.8

@@ -4,36 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 
+from particlesim.rendering.hud.history import History
 from particlesim.rendering.hud.legend import legend_panels
 from particlesim.rendering.hud.panel import Panel, Style
-from particlesim.rendering.hud.readout import Readout, readout_panel
-from particlesim.rendering.shading.colour import ParticleColours
-from particlesim.scene import Scene
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.rendering.hud.readout import readout_panel, readout_rows
+from particlesim.rendering.look import Look
+from particlesim.trajectory.frames import Frame
 
 
 class Overlay:
-    """The panels of one movie, for pictures with a ``dark`` background or a light one.
+    """The panels of one movie, for pictures with a ``dark`` background or a light one."""
 
-    ``first`` is the frame at the start, which the readout's changes refer to.
-    """
+    def __init__(self, look: Look, dark: bool) -> None:
+        self._look = look
+        self._style = Style(look.scene.movie.size, dark)
+        self._legends = legend_panels(look.scene, look.header, look.colours, self._style)
 
-    def __init__(self, scene: Scene, header: Header, first: Frame, colours: ParticleColours, dark: bool) -> None:
-        self._size = scene.movie.size
-        self._style = Style(self._size, dark)
-        self._readout = Readout(scene, header, first)
-        self._legends = legend_panels(scene, header, colours, self._style)
-
-    def draw(self, image: np.ndarray, frame: Frame) -> None:
+    def draw(self, image: np.ndarray, frame: Frame, history: History) -> None:
         """Lay the panels for ``frame`` over ``image`` (h, w, 3) uint8."""
         margin = self._style.margin
-        rows = self._readout(frame)
+        rows = readout_rows(self._look, frame, history)
         taken = (0, 0)
         if rows:
             panel = readout_panel(rows, self._style)
             panel.lay(image, margin, margin)
             taken = margin + panel.size[0], margin + panel.size[1]
-        for legend, left, top in legend_places(self._legends, self._size, taken, margin):
+        for legend, left, top in legend_places(self._legends, self._look.scene.movie.size, taken, margin):
             legend.lay(image, left, top)
 
 

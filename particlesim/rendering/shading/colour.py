@@ -8,7 +8,7 @@ from PIL import ImageColor
 from particlesim.rendering.shading.fields import field_of
 from particlesim.scene import Scene
 from particlesim.scene.groups import FIELDS
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.trajectory.frames import Frame, Header
 
 # Eight colours that colour-blind people tell apart: M. Okabe and K. Ito, "Color Universal Design" (2008), less black.
 PALETTE = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#F0E442")

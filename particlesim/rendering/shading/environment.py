@@ -19,7 +19,7 @@ _FLOOR_SHADOW = 0.78
 _HAZE = 0.22
 
 
-class Surroundings:
+class Environment:
     """Of the pictures of one scene: ``background`` sRGB (3,), whether that is ``dark``, and if there is a floor."""
 
     def __init__(self, scene: Scene) -> None:

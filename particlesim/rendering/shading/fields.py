@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.scene import Scene
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.trajectory.frames import Frame, Header
 
 # How many figures a scale has beside it.
 _FEWEST, _MOST = 3, 5

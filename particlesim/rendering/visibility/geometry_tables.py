@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.trajectory.gsd_file import Header
+from particlesim.trajectory.frames import Header
 
 
 class Bodies(NamedTuple):

@@ -10,7 +10,7 @@ import numpy as np
 from particlesim.rendering.visibility.geometry_tables import Bodies
 from particlesim.scene import Scene
 from particlesim.trajectory.frame_aabb import frame_boxes
-from particlesim.trajectory.gsd_file import Frame, Header
+from particlesim.trajectory.frames import Frame, Header
 
 # Each particle as itself.
 EVERYONE = slice(None)

@@ -1,0 +1,27 @@
+"""What readouts need of the frames before the one that is drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from particlesim.trajectory.frames import Ledger
+
+# Averages over time reach over so many frames before the one that is drawn: walls and partners are hit one by one.
+WINDOW = 30
+
+
+@dataclass(frozen=True)
+class History:
+    """Ledgers of frames that have passed, the latest last; of the oldest no more than ``WINDOW`` are kept."""
+
+    ledgers: tuple[Ledger, ...] = ()
+
+    def then(self, ledger: Ledger | None) -> History:
+        """The history after one more frame, if its ledger is known and it is later than those before."""
+        if ledger is None or (self.ledgers and ledger.time <= self.ledgers[-1].time):
+            return self
+        return History((*self.ledgers, ledger)[-WINDOW:])
+
+    def up_to(self, ledger: Ledger) -> tuple[Ledger, ...]:
+        """The ledgers before that of the present frame, and it."""
+        return (*(passed for passed in self.ledgers if passed.time < ledger.time), ledger)

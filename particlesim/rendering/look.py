@@ -1,0 +1,46 @@
+"""The look of a movie: all that its pictures depend on beside their frames, settled once for the whole run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from particlesim.rendering.camera import Box, subject_box
+from particlesim.rendering.shading.colour import ParticleColours
+from particlesim.scene import Scene
+from particlesim.trajectory.frames import Frame, Header, Ledger
+
+
+@dataclass(frozen=True)
+class Look:
+    """How frames are drawn; the same for all frames of a movie, in whatever order and process they are drawn.
+
+    Parameters
+    ----------
+    scene
+        Camera, movie, what is shown, colours of groups, and the world.
+    header
+        What stays the same about the particles.
+    subject
+        The box that the camera frames [m].
+    colours
+        Colours of particles, with the scales of fields.
+    start
+        Ledger of the first frame, which changes refer to; None where it is not known.
+    """
+
+    scene: Scene
+    header: Header
+    subject: Box
+    colours: ParticleColours
+    start: Ledger | None
+
+
+def look_of(scene: Scene, header: Header, first: Frame) -> Look:
+    """The look of a movie of these particles whose first frame, at the start of the run, is ``first``."""
+    return Look(
+        scene=scene,
+        header=header,
+        subject=subject_box(scene, header, first),
+        colours=ParticleColours(scene, header, first),
+        start=first.ledger,
+    )

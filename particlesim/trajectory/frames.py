@@ -1,0 +1,85 @@
+"""What a trajectory is made of: a header, what stays the same about its particles, and frame after frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from particlesim.geometry.shapes import Shape
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Diagnostics: sums over all particles at one time, and counts since the start.
+
+    Energies [J], momentum [kg m/s], angular momentum about the origin [kg m^2/s]; both vectors (3,).
+    """
+
+    time: float  # [s]
+    time_step: float  # the last one [s]
+    steps: int
+    kinetic_translational: float
+    kinetic_rotational: float
+    potential: float  # in the field of gravity, zero at the corner of the world that it points to
+    momentum: np.ndarray
+    angular_momentum: np.ndarray
+    impacts: int
+    pairs_tested: int  # AABBs compared by the broad phase
+    candidate_pairs: int  # pairs it handed to the narrow phase
+    unresolved: int  # substeps in which more happened than was worked through (see MAX_IMPACTS)
+    virial: float  # sum of r_ij . impulse over pair impacts [J s]
+    wall_impulse: np.ndarray  # (6,) given to the walls -x, +x, -y, +y, -z, +z along their outward normals [N s]
+    largest_overlap: float | None = None  # of two particles, or of one and a wall [m]; only recorded frames have it
+
+    @property
+    def kinetic(self) -> float:
+        """Translational and rotational kinetic energy [J]."""
+        return self.kinetic_translational + self.kinetic_rotational
+
+    @property
+    def energy(self) -> float:
+        """Kinetic and potential energy [J]."""
+        return self.kinetic + self.potential
+
+
+@dataclass(frozen=True)
+class Header:
+    """What stays the same from frame to frame.
+
+    ``scene_json``: the scene as JSON. ``shapes``: the shapes of size 1 that occur. Arrays (n,): ``shape`` index
+    into ``shapes``, ``size`` the factor on it, ``group`` the entry of the scene's particles, ``mass`` [kg].
+    ``inertia`` (n, 3): principal moments [kg m^2].
+    """
+
+    scene_json: str
+    shapes: tuple[Shape, ...]
+    shape: np.ndarray
+    size: np.ndarray
+    group: np.ndarray
+    mass: np.ndarray
+    inertia: np.ndarray
+
+    @property
+    def radius(self) -> np.ndarray:
+        """Of the bounding spheres, (n,) [m]."""
+        return np.array([shape.radius for shape in self.shapes])[self.shape] * self.size
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The particles at one time [s].
+
+    ``position`` (n, 3) [m], ``orientation`` (n, 4) quaternions (w, x, y, z) body to world, ``velocity`` (n, 3) [m/s],
+    ``angular_momentum`` (n, 3) about the centroids, world axes [kg m^2/s], ``image`` (n, 3) turns round a periodic
+    world, ``impacts`` (n,) of each since the start; ``ledger`` the sums over them, None where they are not known.
+    """
+
+    time: float
+    position: np.ndarray
+    orientation: np.ndarray
+    velocity: np.ndarray
+    angular_momentum: np.ndarray
+    image: np.ndarray
+    impacts: np.ndarray
+    ledger: Ledger | None = None
