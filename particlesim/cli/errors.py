@@ -26,7 +26,7 @@ def one_line_errors(source: Path) -> Iterator[None]:
             yield
         except SceneError as error:
             fail(str(error if error.file else error.within(source)), 2)
-        except BrokenPipeError:  # whoever reads the output has seen enough; typer ends the program
+        except BrokenPipeError:  # the reader of the output has closed it; typer ends the program
             raise
         except (RenderError, OSError) as error:
             fail(_described(error), 1)

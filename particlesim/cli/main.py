@@ -80,9 +80,9 @@ def check(scene: SceneArgument) -> None:
     """Validate a scene and say what it amounts to, without simulating it."""
     with one_line_errors(scene):
         loaded = load(scene)
-        from particlesim.simulation.estimate import survey  # noqa: PLC0415
+        from particlesim.simulation.estimate import estimate  # noqa: PLC0415
 
-        print_table(scene.name, survey(loaded))
+        print_table(scene.name, estimate(loaded))
 
 
 @app.command(short_help="Compare the broad phases on a scene, on a sweep or on a stream of boxes.")

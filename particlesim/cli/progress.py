@@ -18,7 +18,7 @@ _INTERVAL = 5.0
 _FIRST_TIMED = 2
 
 
-class _Pace:
+class _Rate:
     """How long the rest of a phase takes, from how long its frames took."""
 
     def __init__(self) -> None:
@@ -48,11 +48,11 @@ class _Lines:
         self._unit = unit
         self._phase = ""
         self._last = time.monotonic()
-        self._pace = _Pace()
+        self._rate = _Rate()
 
     def __call__(self, phase: str, done: int, total: int) -> None:
         now = time.monotonic()
-        left = self._pace.left(done, total)
+        left = self._rate.left(done, total)
         if phase == self._phase and now - self._last < _INTERVAL and done < total:
             return
         self._phase, self._last = phase, now
@@ -77,7 +77,7 @@ class _Bar:
         self._bar = bar
         self._unit = unit
         self._task = bar.add_task("starting", total=None)
-        self._pace = _Pace()
+        self._rate = _Rate()
 
     def __call__(self, phase: str, done: int, total: int) -> None:
         counted = f"{self._unit} {done} of {total}" if done else f"{total} {self._unit}s"
@@ -86,7 +86,7 @@ class _Bar:
             completed=done,
             total=total if done else None,
             description=f"{phase}  {counted}",
-            left=self._pace.left(done, total),
+            left=self._rate.left(done, total),
         )
 
 

@@ -13,7 +13,7 @@ import typer
 from particlesim.cli.errors import one_line_errors
 from particlesim.cli.options import MaxDrift, Quiet, Threads
 from particlesim.cli.output import place_for
-from particlesim.cli.render_options import Wishes, wished_frames, wished_scene, wished_time
+from particlesim.cli.render_options import RenderOptions, frames_asked, scene_as_asked, still_time
 from particlesim.cli.run import load, make_file
 
 if TYPE_CHECKING:
@@ -61,11 +61,11 @@ def render(
     max_drift: MaxDrift = None,
 ) -> None:
     """Simulate a scene, or read a trajectory, and make a movie of it, with a poster (PNG) beside it."""
-    wishes = Wishes(frames, every, still, look, quality, size, camera, colour, scale)
-    with one_line_errors(source), _opened(source, wishes) as movable:
+    options = RenderOptions(frames, every, still, look, quality, size, camera, colour, scale)
+    with one_line_errors(source), _opened(source, options) as movable:
         subject, scene, total = movable
-        time = wished_time(scene.duration, wishes)
-        chosen = None if time is not None else wished_frames(total, wishes)
+        time = still_time(scene.duration, options)
+        chosen = None if time is not None else frames_asked(total, options)
         from particlesim.jobs import movie  # noqa: PLC0415
 
         if time is None:
@@ -77,16 +77,16 @@ def render(
 
 
 @contextmanager
-def _opened(source: Path, wishes: Wishes) -> Iterator[tuple[Scene | Trajectory, Scene, int]]:
+def _opened(source: Path, options: RenderOptions) -> Iterator[tuple[Scene | Trajectory, Scene, int]]:
     """What to make a movie of, the scene as it is to be drawn, and how many frames there are.
 
     SceneError or TrajectoryError if the source cannot be read, OptionError for a value that is not allowed.
     """
     if source.suffix.lower() != ".gsd":
-        scene = wished_scene(load(source), wishes, of_trajectory=False)
+        scene = scene_as_asked(load(source), options, of_trajectory=False)
         yield scene, scene, scene.frames
         return
     from particlesim.trajectory.gsd_file import Trajectory  # noqa: PLC0415
 
     with Trajectory(source) as trajectory:
-        yield trajectory, wished_scene(trajectory.scene, wishes, of_trajectory=True), len(trajectory)
+        yield trajectory, scene_as_asked(trajectory.scene, options, of_trajectory=True), len(trajectory)

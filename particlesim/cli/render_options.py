@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from particlesim.scene import Scene
 
 
-class Wishes(NamedTuple):
+class RenderOptions(NamedTuple):
     """The values of options as they were given, None for those that were not."""
 
     frames: str | None
@@ -28,59 +28,59 @@ class Wishes(NamedTuple):
     scale: str | None
 
 
-def wished_scene(scene: Scene, wishes: Wishes, *, of_trajectory: bool) -> Scene:
+def scene_as_asked(scene: Scene, options: RenderOptions, *, of_trajectory: bool) -> Scene:
     """The scene as the options change it. OptionError for a value that is not allowed, SceneError for a wrong look."""
     from particlesim.scene.overrides import replaced, scaled, with_colour, with_movie  # noqa: PLC0415
 
-    if wishes.scale is not None:
+    if options.scale is not None:
         if of_trajectory:
             raise OptionError("--scale: only of a scene, whose particles are yet to be placed")
-        factor = _number("--scale", wishes.scale, "a number above 0", above=0.0)
-        scene = _allowed("--scale", wishes.scale, lambda: scaled(scene, factor))
-    if wishes.look is not None:
-        scene = _with_look_of(scene, wishes.look)
-    if wishes.quality is not None:
-        quality = wishes.quality
+        factor = _number("--scale", options.scale, "a number above 0", above=0.0)
+        scene = _allowed("--scale", options.scale, lambda: scaled(scene, factor))
+    if options.look is not None:
+        scene = _with_look_of(scene, options.look)
+    if options.quality is not None:
+        quality = options.quality
         scene = _allowed("--quality", quality, lambda: with_movie(scene, quality=quality, resolution=None))
-    if wishes.size is not None:
-        resolution = _resolution(wishes.size)
-        scene = _allowed("--size", wishes.size, lambda: with_movie(scene, resolution=resolution))
-    if wishes.camera is not None:
-        camera = _table_or_word("--camera", wishes.camera)
+    if options.size is not None:
+        resolution = _resolution(options.size)
+        scene = _allowed("--size", options.size, lambda: with_movie(scene, resolution=resolution))
+    if options.camera is not None:
+        camera = _table_or_word("--camera", options.camera)
         scene = _allowed("--camera", None, lambda: replaced(scene, camera=camera))
-    if wishes.colour is not None:
-        colour = wishes.colour
+    if options.colour is not None:
+        colour = options.colour
         scene = _allowed("--colour", colour, lambda: with_colour(scene, colour))
     return scene
 
 
-def wished_frames(total: int, wishes: Wishes) -> range:
+def frames_asked(total: int, options: RenderOptions) -> range:
     """Numbers of the frames to draw, of ``total``. OptionError if there are none, or if the values say nothing."""
     start = stop = None
-    if wishes.frames is not None:
-        match = re.fullmatch(r"\s*(-?\d*)\s*:\s*(-?\d*)\s*", wishes.frames)
+    if options.frames is not None:
+        match = re.fullmatch(r"\s*(-?\d*)\s*:\s*(-?\d*)\s*", options.frames)
         if not match or "-" in match.groups():
             allowed = "must be A:B, from frame A up to but without frame B; either may be left out"
-            raise OptionError(f"--frames {wishes.frames}: {allowed}")
+            raise OptionError(f"--frames {options.frames}: {allowed}")
         start, stop = (int(text) if text else None for text in match.groups())
-    step = 1 if wishes.every is None else _whole("--every", wishes.every)
+    step = 1 if options.every is None else _whole("--every", options.every)
     chosen = range(total)[start:stop:step]
     if not chosen:
-        raise OptionError(f"--frames {wishes.frames}: there are none; the frames are 0 to {total - 1:,}")
+        raise OptionError(f"--frames {options.frames}: there are none; the frames are 0 to {total - 1:,}")
     return chosen
 
 
-def wished_time(duration: float, wishes: Wishes) -> float | None:
+def still_time(duration: float, options: RenderOptions) -> float | None:
     """The time of the still picture [s], None if a movie is wanted. OptionError if it is not in the scene."""
-    if wishes.still is None:
+    if options.still is None:
         return None
-    for option, value in (("--frames", wishes.frames), ("--every", wishes.every)):
+    for option, value in (("--frames", options.frames), ("--every", options.every)):
         if value is not None:
             raise OptionError(f"{option}: of a movie, not of the one picture that --still asks for")
     what = f"a time from 0 to {duration:g} s"
-    time = _number("--still", wishes.still, what)
+    time = _number("--still", options.still, what)
     if not 0.0 <= time <= duration:
-        raise OptionError(f"--still {wishes.still}: must be {what}")
+        raise OptionError(f"--still {options.still}: must be {what}")
     return time
 
 

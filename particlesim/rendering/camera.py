@@ -200,9 +200,9 @@ def _swept(points: np.ndarray) -> np.ndarray:
     """Points (n, 3) that turn about the upright axis through the origin, in many places all the way round."""
     # As seen by a camera that circles.
     radius = np.hypot(points[:, 0], points[:, 1])[:, None]
-    turn = np.linspace(0.0, 2.0 * np.pi, 361)
-    height = np.broadcast_to(points[:, 2:], (len(points), len(turn)))
-    return np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=-1).reshape(-1, 3)
+    angle = np.linspace(0.0, 2.0 * np.pi, 361)
+    height = np.broadcast_to(points[:, 2:], (len(points), len(angle)))
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1).reshape(-1, 3)
 
 
 def _near(position: np.ndarray, scene: Scene, box: Box) -> float:

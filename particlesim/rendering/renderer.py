@@ -17,7 +17,7 @@ from particlesim.rendering.quality import PRESETS
 from particlesim.rendering.shading.ambient_occlusion import Sky
 from particlesim.rendering.shading.environment import Environment
 from particlesim.rendering.shading.floor import Ground
-from particlesim.rendering.shading.fxaa import smooth_edges
+from particlesim.rendering.shading.fxaa import fxaa
 from particlesim.rendering.shading.lighting import key_light
 from particlesim.rendering.shading.surfaces import TILE, surfaces_of, table_of
 from particlesim.rendering.visibility.geometry_tables import bodies_of
@@ -50,8 +50,8 @@ class Renderer:
         self._overlay = Overlay(look, environment.dark)
         self._bodies = bodies = bodies_of(look.header)
         self._light = key_light(scene, round(quality.shadow * self._size[1]))
-        self._sky = Sky(np.asarray(scene.world.size), bodies.outer) if quality.sky else None
-        shaded = environment.has_floor and quality.sky
+        self._sky = Sky(np.asarray(scene.world.size), bodies.outer) if quality.ambient_occlusion else None
+        shaded = environment.has_floor and quality.ambient_occlusion
         self._ground = Ground(*environment.floor, bodies.inner, bodies.outer) if shaded else None
         tile = np.array([(0.5 * TILE, 0.5 * TILE, 0.0)])
         self._spheres, self._hulls = bridge.Layer(bridge.SPHERES, tile), bridge.Layer(bridge.HULLS, tile)
@@ -105,7 +105,7 @@ class Renderer:
         )
         drawn = self._canvas.draw(picture)
         # OpenGL's first row is the lowest, and it has a fourth channel.
-        image = smooth_edges(drawn) if self._quality.smooth else np.ascontiguousarray(drawn[::-1, :, :3])
+        image = fxaa(drawn) if self._quality.fxaa else np.ascontiguousarray(drawn[::-1, :, :3])
         self._overlay.draw(image, frame, history or History())
         return image
 
@@ -129,7 +129,7 @@ class Renderer:
         return np.column_stack([self._look.colours(frame, cast.particles(members)), light])
 
     def _shadow_map(self, cast: Cast, groups: Groups) -> np.ndarray:
-        """How close to the key light what it meets is, (h, w) float32 [m]."""
+        """The shadow map: closeness to the key light of the surface that it shines on, (h, w) float32 [m]."""
         return look(self._light.outlook, cast.bodies, groups, cast.orientation).close
 
     def _put_lines(self, view: View, frame: Frame) -> None:
@@ -152,8 +152,8 @@ class Renderer:
         # Without a far plane: particles of an open world are drawn however far they fly.
         projection[2, 2:] = -1.0, -2.0 * view.near
         projection[3, 2] = -1.0
-        turn = np.eye(4)
-        turn[:3, :3] = view.pose[:3, :3].T
+        rotation = np.eye(4)
+        rotation[:3, :3] = view.pose[:3, :3].T
         rows = [
             (*eye, 0.0),
             (*self._light.towards, 0.0),
@@ -166,5 +166,6 @@ class Renderer:
             (slope * width / height, slope, 0.0, 0.0),
             *self._environment.place_rows(view),
         ]
-        matrices = [(projection @ turn).T.ravel(), self._light.matrix(eye).T.ravel()]  # by columns, as OpenGL has them
+        # By columns, as OpenGL has them.
+        matrices = [(projection @ rotation).T.ravel(), self._light.matrix(eye).T.ravel()]
         return np.concatenate([*matrices, np.ravel(rows)], dtype=np.float32, casting="same_kind")

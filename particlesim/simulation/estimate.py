@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from particlesim.scene import Scene
+from particlesim.scene.camera import Movie
 from particlesim.setup.build import BYTES_PER_PARTICLE
 from particlesim.simulation.simulation import Simulation
 
@@ -14,41 +15,58 @@ from particlesim.simulation.simulation import Simulation
 _BYTES_OF_PROCESS = 400e6
 
 
-def survey(scene: Scene) -> list[tuple[str, str]]:
+def estimate(scene: Scene) -> list[tuple[str, str]]:
     """Name and value of what one wants to know of a scene. SceneError if it cannot be built."""
     simulation = Simulation(scene)
-    c, world = simulation.constants, scene.world
-    volume = math.prod(world.size)
-    volumes = np.array([s.volume for s in simulation.shapes])[c.shape] * c.size**3 if len(c.size) else np.zeros(0)
-    rows = [("particles", f"{len(c.size):,}")]
-    for g, group in enumerate(scene.particles):
-        members = c.group == g
-        name = group.name or f"particles[{g}]"
-        if not members.any():
-            rows.append((f"  {name}", "none"))
-            continue
-        shape = simulation.shapes[int(c.shape[members][0])]
-        sizes = c.size[members]
-        span = f"{sizes.min():g}" if sizes.min() == sizes.max() else f"{sizes.min():g} to {sizes.max():g}"
-        rows.append(
-            (f"  {name}", f"{members.sum():,} x {shape.name}, size {span}, mass {c.mass[members].sum():.4g} kg")
-        )
-    width, height = scene.movie.size
-    pixels = 3 * width * height
-    chosen = "given" if scene.solver.time_step != "auto" else "automatic, at the start"
-    step = simulation.next_time_step()
+    world, movie = scene.world, scene.movie
     return [
-        *rows,
+        *_particle_rows(simulation),
         ("world", f"{' x '.join(f'{edge:g}' for edge in world.size)} m, {', '.join(world.boundary)}"),
-        ("volume fraction", f"{volumes.sum() / volume:.3g}"),
+        ("volume fraction", f"{_volume(simulation) / math.prod(world.size):.3g}"),
         ("broad phase", scene.solver.broad_phase.kind),
-        ("time step", f"{step:.3g} s ({chosen}), about {math.ceil(scene.duration / step):,} steps"),
+        ("time step", _time_step(simulation)),
         ("duration", f"{scene.duration:g} s"),
-        ("frames", f"{scene.frames:,} of {width} x {height} at {scene.movie.fps:g} a second{_pace(scene.movie.speed)}"),
-        ("memory", f"about {(_BYTES_OF_PROCESS + BYTES_PER_PARTICLE * len(c.size) + 30 * pixels) / 1e6:,.0f} MB"),
+        ("frames", f"{scene.frames:,} of {movie.size[0]} x {movie.size[1]} at {movie.fps:g} a second{_speed(movie)}"),
+        ("memory", f"about {_bytes(scene) / 1e6:,.0f} MB"),
     ]
 
 
-def _pace(speed: float) -> str:
+def _particle_rows(simulation: Simulation) -> list[tuple[str, str]]:
+    """How many particles there are in all and in each group, with their shape, sizes and mass."""
+    constants, groups = simulation.constants, simulation.scene.particles
+    rows = [("particles", f"{len(constants.size):,}")]
+    for g, group in enumerate(groups):
+        members = np.flatnonzero(constants.group == g)
+        rows.append((f"  {group.name or f'particles[{g}]'}", _group(simulation, members) if len(members) else "none"))
+    return rows
+
+
+def _group(simulation: Simulation, members: np.ndarray) -> str:
+    constants = simulation.constants
+    shape, sizes = simulation.shapes[int(constants.shape[members[0]])], constants.size[members]
+    span = f"{sizes.min():g}" if sizes.min() == sizes.max() else f"{sizes.min():g} to {sizes.max():g}"
+    return f"{len(members):,} x {shape.name}, size {span}, mass {constants.mass[members].sum():.4g} kg"
+
+
+def _volume(simulation: Simulation) -> float:
+    """Of all particles [m^3]."""
+    constants = simulation.constants
+    volumes = np.array([shape.volume for shape in simulation.shapes])
+    return float((volumes[constants.shape] * constants.size**3).sum()) if len(constants.size) else 0.0
+
+
+def _time_step(simulation: Simulation) -> str:
+    step, scene = simulation.next_time_step(), simulation.scene
+    chosen = "given" if scene.solver.time_step != "auto" else "automatic, at the start"
+    return f"{step:.3g} s ({chosen}), about {math.ceil(scene.duration / step):,} steps"
+
+
+def _speed(movie: Movie) -> str:
     """How fast a movie shows what happens, if not as fast as it does."""
-    return "" if speed == 1.0 else f", {speed:g} times as fast as it happens"
+    return "" if movie.speed == 1.0 else f", {movie.speed:g} times as fast as it happens"
+
+
+def _bytes(scene: Scene) -> float:
+    """Memory that a run takes."""
+    pixels = 3 * math.prod(scene.movie.size)
+    return _BYTES_OF_PROCESS + BYTES_PER_PARTICLE * scene.number + 30 * pixels

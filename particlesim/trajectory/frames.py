@@ -71,8 +71,8 @@ class Frame:
     """The particles at one time [s].
 
     ``position`` (n, 3) [m], ``orientation`` (n, 4) quaternions (w, x, y, z) body to world, ``velocity`` (n, 3) [m/s],
-    ``angular_momentum`` (n, 3) about the centroids, world axes [kg m^2/s], ``image`` (n, 3) turns round a periodic
-    world, ``impacts`` (n,) of each since the start; ``ledger`` the sums over them, None where they are not known.
+    ``angular_momentum`` (n, 3) about the centroids, world axes [kg m^2/s], ``image`` (n, 3) periods that a particle has
+    crossed, ``impacts`` (n,) of each since the start; ``ledger`` the sums over them, None where they are not known.
     """
 
     time: float

@@ -100,8 +100,8 @@ def _impacts(header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
 def _impact_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, float]:
     """From none to twice as many as a bounding sphere of a gas at the first speeds has had when the movie ends.
 
-    It meets others at a rate of sqrt(2) pi d^2 n v, and walls of area A around a volume V at A v / 4 V (J. Jeans, An
-    Introduction to the Kinetic Theory of Gases, 1940, ch. 2 and 5).
+    It collides with others at a rate of sqrt(2) pi d^2 n v, and with walls of area A around a volume V at A v / 4 V
+    (J. Jeans, An Introduction to the Kinetic Theory of Gases, 1940, ch. 2 and 5).
     """
     edges = np.asarray(scene.world.size)
     volume = float(edges.prod())

@@ -1,4 +1,4 @@
-"""Smooths the jagged edges of a picture that has one sample a pixel.
+"""Fast approximate antialiasing (FXAA): smooths the jagged edges of a picture that has one sample a pixel.
 
 Where brightness steps, a pixel is mixed with the one across the edge, the more the nearer the step of its stair is:
 the idea of T. Lottes, "FXAA" (NVIDIA white paper, 2009).
@@ -22,7 +22,7 @@ _FARTHEST = 16
 _SUBDUED = 0.6
 
 
-def smooth_edges(image: np.ndarray) -> np.ndarray:
+def fxaa(image: np.ndarray) -> np.ndarray:
     """A smoother picture, (height, width, 3) uint8; ``image`` (height, width, 4) uint8, as it comes from OpenGL.
 
     OpenGL's first row is the lowest, that of the result the highest; the fourth channel is left out.
@@ -31,10 +31,10 @@ def smooth_edges(image: np.ndarray) -> np.ndarray:
     # A rim as bright as what it surrounds, for the neighbours of the pixels there.
     bright = np.empty((height + 2, width + 2), dtype=np.float32)
     smooth = np.empty((height, width, 3), dtype=np.uint8)
-    crew = ThreadTeam(height * width)
-    crew.each(lambda _, first, last: _brightness(image, bright, smooth, first, last), height)
+    team = ThreadTeam(height * width)
+    team.each(lambda _, first, last: _brightness(image, bright, smooth, first, last), height)
     bright[0], bright[-1] = bright[1], bright[-2]
-    crew.each(lambda _, first, last: _smooth(image, bright, smooth, first, last), height)
+    team.each(lambda _, first, last: _smooth(image, bright, smooth, first, last), height)
     return smooth
 
 
@@ -121,16 +121,16 @@ def _share(bright, at, across, along, back, ahead):
     here, there = bright[at], bright[at + across]
     middle, quarter = 0.5 * (here + there), 0.25 * abs(there - here)
     for k in range(1, max(back, ahead) + 1):
-        for way, room in ((-1, back), (1, ahead)):
-            change = _change(bright, at + way * k * along, across, middle) if k <= room else 0.0
+        for direction, room in ((-1, back), (1, ahead)):
+            change = _change(bright, at + direction * k * along, across, middle) if k <= room else 0.0
             if abs(change) >= quarter:
                 # Of the two sides only that whose colour ends where the step does gives way to the other.
                 if (change < 0.0) == (here < middle):
                     return 0.0
-                rest = back if way > 0 else ahead
+                rest = back if direction > 0 else ahead
                 total = k + _FARTHEST
                 for n in range(k, rest + 1):
-                    if abs(_change(bright, at - way * n * along, across, middle)) >= quarter:
+                    if abs(_change(bright, at - direction * n * along, across, middle)) >= quarter:
                         total = k + n
                         break
                 return max(0.5 - (k - 0.5) / (total - 1.0), 0.0)

@@ -33,7 +33,7 @@ class Light(NamedTuple):
 
     @property
     def outlook(self) -> Outlook:
-        """The light as one who looks."""
+        """The projection of the shadow map."""
         return Outlook(self.axes, np.zeros(3), True, self.pixels[0] / (2.0 * self.reach[0]), self.pixels)
 
     def matrix(self, eye: np.ndarray) -> np.ndarray:

@@ -123,7 +123,7 @@ class _Encoder:
         pipe = self._process.stdin
         assert pipe is not None
         while (image := self._images.get()) is not None:
-            # A broken encoder still empties the queue: nobody may wait for it.
+            # A broken encoder still empties the queue: nothing may wait for it.
             if not self._broken.is_set():
                 start = time.perf_counter()
                 try:
