@@ -85,6 +85,14 @@ def test_numba_is_reached_through_the_one_decorator(path):
     assert "njit" not in path.read_text(encoding="utf-8") or path.name == "jit.py"
 
 
+def test_editors_know_every_public_name():
+    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
+    (block,) = (node for node in tree.body if isinstance(node, ast.If))
+    known = {alias.name: node.module for node in block.body for alias in node.names}
+    assert sorted(known) == sorted(particlesim.__all__)
+    assert known == {name: f"particlesim.{home}" for name, home in particlesim._HOMES.items()}
+
+
 def test_public_names_are_there_and_documented():
     for name in particlesim.__all__:
         thing = getattr(particlesim, name)

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from particlesim import Simulation
 from particlesim.benchmarks.broad_phase import compare_frames, compare_scene, sweep
 from particlesim.benchmarks.broad_phase.boxes import make_boxes
+from particlesim.benchmarks.broad_phase.figure import _bar_colours
 from particlesim.benchmarks.broad_phase.measure import Found, Measured, digest, duration, measure_by_turns, peak_memory
 from particlesim.benchmarks.broad_phase.peers import peer_search, peers
 from particlesim.benchmarks.broad_phase.stream import Stream, StreamError, read_stream, write_stream
@@ -281,6 +282,18 @@ class TestCommand:
         assert result.exit_code == 0
         assert "scene: 20 boxes, 4 frames" in result.stdout
         assert "trajectory" not in result.stdout
+
+    def test_a_broad_phase_that_joins_the_registry_has_its_place(self, folder, monkeypatch):
+        monkeypatch.setitem(METHODS, "fourth", METHODS["naive"])
+        monkeypatch.setitem(METHODS, "fifth", METHODS["octree"])
+        result = run("scene.toml", "--steps", "1")
+        assert result.exit_code == 0, result.exception
+        table = json.loads((folder / "renders/compare_scene.json").read_text())
+        assert [row["method"] for row in table["results"]] == list(METHODS)
+        figure = (folder / "renders/compare_scene.svg").read_text()
+        assert "fourth" in figure and "fifth" in figure
+        colours = _bar_colours(["naive", "fourth", "grid", "fifth", "octree"])
+        assert len(set(colours)) == 5
 
     def test_a_sweep(self, folder):
         result = run("--sweep", "mixed", "--largest", "316")

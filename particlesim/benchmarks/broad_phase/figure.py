@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 
 # Colours that people who confuse red and green can tell apart: M. Okabe, K. Ito, "Color Universal Design", 2008.
 _COLOURS = {"naive": "#D55E00", "grid": "#0072B2", "octree": "#009E73"}
+_FURTHER = ("#CC79A7", "#E69F00", "#56B4E9", "#F0E442")  # for broad phases that join the registry
 _OTHERS = ("#7F7F7F", "#B0B0B0")
 _NAMES = {"grid": "boxing (grid)"}
 
@@ -54,12 +57,18 @@ def draw_scene(comparison: SceneComparison, path: Path) -> list[Path]:
     names = [result.method for result in comparison.ran]
     for axes, (value, label) in zip(figure.subplots(1, len(panels)), panels, strict=True):
         heights = [getattr(result, value) for result in comparison.ran]
-        axes.bar(names, heights, color=[_COLOURS[name] for name in names], width=0.6)
+        axes.bar(names, heights, color=_bar_colours(names), width=0.6)
         axes.set(yscale="log", title=label)
         axes.title.set_size(9)
     about = f"{comparison.name}: {comparison.boxes:,} boxes, {comparison.frames} frames"
     figure.suptitle(f"{about}, {machine_words(comparison.machine)}", fontsize=10)
     return _save(figure, path)
+
+
+def _bar_colours(names: Sequence[str]) -> list[str]:
+    """A colour for each broad phase: its own, or the next that is free."""
+    further = itertools.cycle(_FURTHER)
+    return [_COLOURS.get(name) or next(further) for name in names]
 
 
 def _curve(
