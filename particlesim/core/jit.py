@@ -8,10 +8,10 @@ cannot be run, what a change does not concern is not compiled again, and a packa
 from __future__ import annotations
 
 import functools
-import getpass
 import hashlib
 import os
 import re
+import stat
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -51,17 +51,30 @@ def _digest(module: str) -> str:
 
 
 def _cache_folder() -> str:
-    """The folder for compiled kernels: NUMBA_CACHE_DIR if set, else the user's cache, else a temporary folder."""
-    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    folder = Path(base) / "particlesim" / "kernels"
+    """The folder for compiled kernels: NUMBA_CACHE_DIR if set, else the user's cache, else a private temporary one."""
+    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     try:
+        folder = Path(base or Path.home() / ".cache") / "particlesim" / "kernels"
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
-    except OSError:
-        folder = Path(tempfile.gettempdir()) / f"particlesim-{getpass.getuser()}-{folder.name}"
-        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):  # RuntimeError: a user without an entry in passwd, and HOME is not set
+        return str(_private_folder(Path(tempfile.gettempdir()) / f"particlesim-{os.getuid()}"))
     return str(folder)
+
+
+def _private_folder(folder: Path) -> Path:
+    """``folder`` if none but this user can write to it, made if it is not there; else a new one.
+
+    Its name can be foreseen, and what is in it is run: anybody could have put it there.
+    """
+    try:
+        folder.mkdir(mode=0o700)
+    except FileExistsError:
+        found = folder.lstat()
+        if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
+            return Path(tempfile.mkdtemp(prefix="particlesim-"))
+    return folder
 
 
 CACHE_FOLDER = _cache_folder()
