@@ -172,26 +172,32 @@ def test_the_doctor_ends_with_the_fix_on_a_line_of_its_own(monkeypatch):
     assert run("doctor").exit_code == 0
 
 
-def test_ctrl_c_ends_with_one_line_and_nothing_half_written(folder):
+@pytest.mark.parametrize(
+    ("number", "code", "word"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated"), (signal.SIGHUP, 129, "hung up")],
+)
+@pytest.mark.parametrize(("command", "phase"), [("simulate", "simulating"), ("render", "rendering")])
+def test_a_signal_ends_with_one_line_and_nothing_half_written(folder, command, phase, number, code, word):
     (folder / "scene.toml").write_text(SCENE.replace("duration = 0.1", "duration = 1e6"))
-    # A shell that runs tests in the background ignores the signal, and children inherit that.
     child = subprocess.Popen(
-        [sys.executable, "-m", "particlesim", "simulate", "scene.toml"],
+        [sys.executable, "-m", "particlesim", command, "scene.toml"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # noqa: PLW1509
+        # A shell that runs tests in the background ignores Ctrl-C, nohup a hang-up, and children inherit that.
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # noqa: PLW1509
     )
     lines = []
     for line in child.stderr:
         lines.append(line)
-        if line.startswith("simulating"):
-            assert any(name.startswith(".scene.") for name in os.listdir("renders"))
-            child.send_signal(signal.SIGINT)
+        if line.startswith(phase):
+            # ffmpeg may not have begun to write.
+            assert command == "render" or any(name.startswith(".scene.") for name in os.listdir("renders"))
+            child.send_signal(number)
             break
     rest, errors = child.communicate(timeout=60)
-    assert (child.returncode, rest) == (130, "")
-    assert errors.splitlines()[-1] == "interrupted; nothing was written"
+    assert (child.returncode, rest) == (code, "")
+    assert errors.splitlines()[-1] == f"{word}; nothing was written"
     assert "Traceback" not in errors
     assert files(folder) == ["scene.toml"]
 

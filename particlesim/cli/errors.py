@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn
 
 import typer
+
+# What is said of the signals that end a program.
+_ENDED = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
 
 
 class OptionError(ValueError):
@@ -35,8 +39,9 @@ def one_line_errors(source: Path) -> Iterator[None]:
             if not type(error).__module__.startswith("particlesim."):
                 raise
             fail(str(error), 2 if isinstance(error, ValueError) else 1)
-    except KeyboardInterrupt:
-        fail("interrupted; nothing was written", 130)
+    except KeyboardInterrupt as error:
+        number = getattr(error, "number", signal.SIGINT)
+        fail(f"{_ENDED[number]}; nothing was written", 128 + number)
 
 
 def _described(error: Exception) -> str:
@@ -48,5 +53,6 @@ def _described(error: Exception) -> str:
 
 def fail(message: str, code: int) -> NoReturn:
     """End the program with a line and this exit code."""
-    print(message, file=sys.stderr)
+    with suppress(OSError):  # a terminal that has been closed
+        print(message, file=sys.stderr)
     raise typer.Exit(code)

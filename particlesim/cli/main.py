@@ -15,6 +15,7 @@ from particlesim.cli.output import check_output, place_for
 from particlesim.cli.render import render
 from particlesim.cli.run import load, make_file
 from particlesim.cli.tables import print_report, print_table
+from particlesim.core.interrupts import raise_signals
 
 app = typer.Typer(
     name="particlesim",
@@ -43,8 +44,9 @@ def main() -> None:
     """Run the command line.
 
     Exit code 2 for wrong input, 1 for what this machine cannot do, 3 for a drift of energy that was not allowed,
-    130 for Ctrl-C.
+    130 for Ctrl-C, 143 and 129 for SIGTERM and SIGHUP.
     """
+    raise_signals()
     app()
 
 
