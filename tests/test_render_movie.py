@@ -114,6 +114,23 @@ def test_failing_ffmpeg_says_why_in_one_line(tmp_path, monkeypatch):
     assert [p.name for p in tmp_path.iterdir()] == ["ffmpeg"]
 
 
+def test_an_ffmpeg_that_is_killed_names_the_signal(tmp_path, monkeypatch):
+    fake = tmp_path / "ffmpeg"
+    fake.write_text("#!/bin/sh\nkill -9 $$\n")
+    fake.chmod(0o755)
+    monkeypatch.setattr(movie, "ffmpeg", lambda: str(fake))
+    with pytest.raises(RenderError, match=r"^ffmpeg was ended by SIGKILL: no message$"):
+        write_movie(tmp_path / "a.mp4", images(200), 30.0, SIZE)
+
+
+@pytest.mark.parametrize("name", ["12:30.mp4", "http:a.mp4", "-a.mp4", "a b%03d.mp4", "Zeit \u00fc.mp4"])
+def test_any_name_is_a_path(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    write_movie(name, images(3), 30.0, SIZE)
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+    assert len(decoded(f"file:{name}")[1]) == 3
+
+
 def test_missing_folder_is_named(tmp_path):
     with pytest.raises(FileNotFoundError, match="no folder"):
         write_movie(tmp_path / "none" / "a.mp4", images(1), 30.0, SIZE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import queue
+import signal
 import subprocess
 import tempfile
 import threading
@@ -135,11 +136,12 @@ class _Encoder:
             pipe.close()
 
     def _fail(self) -> None:
-        self._process.wait()
+        status = self._process.wait()
         self._log.seek(0)
         lines = self._log.read().decode(errors="replace").split("\n")
         last = next((line.strip() for line in reversed(lines) if line.strip()), "no message")
-        raise RenderError(f"ffmpeg failed with exit status {self._process.returncode}: {last}")
+        how = f"was ended by {signal.Signals(-status).name}" if status < 0 else f"failed with exit status {status}"
+        raise RenderError(f"ffmpeg {how}: {last}")
 
 
 def _command(path: Path, fps: float, size: tuple[int, int], crf: int) -> list[str]:
@@ -151,5 +153,6 @@ def _command(path: Path, fps: float, size: tuple[int, int], crf: int) -> list[st
     codec = ["-c:v", "libx264", "-preset", "veryfast", "-crf", str(crf), "-threads", str(_THREADS)]
     # No versions, dates or settings in the file (unit type 6): the same images, the same bytes.
     bare = ["-fflags", "+bitexact", "-flags:v", "+bitexact", "-bsf:v", "filter_units=remove_types=6"]
-    target = ["-movflags", "+faststart", "-f", "mp4", str(path)]
+    # A path as it is: "12:30.mp4" would be a protocol.
+    target = ["-movflags", "+faststart", "-f", "mp4", f"file:{path}"]
     return [ffmpeg(), "-y", "-v", "error", *source, "-an", "-vf", scale, *codec, *tags, *bare, *target]
