@@ -31,6 +31,7 @@ resolution = [64, 64]
 """
 
 TOO_LARGE = "particles[0].size = 5.0: too large: particles are 5 m thick, between walls 4 m apart"
+NO_FILE = "is not a file to write to; movies and trajectories need one"
 
 
 @pytest.fixture
@@ -110,6 +111,11 @@ def test_quiet_prints_nothing_and_a_missing_ending_is_added(folder):
         (["simulate", "scene.toml", "-o", "run.txt"], "run.txt: the output must end in .gsd"),
         (["render", "scene.toml", "-o", "movie.avi"], "movie.avi: the output must end in .mp4"),
         (["render", "scene.toml", "-o", "."], ".: is a folder, not a file to write to"),
+        (["render", "scene.toml", "-o", "z.gif"], "z.gif: the output must end in .mp4"),
+        (["render", "scene.toml", "-o", "-"], f"-: {NO_FILE}"),
+        (["render", "scene.toml", "-o", "/dev/null"], f"/dev/null: {NO_FILE}"),
+        (["simulate", "scene.toml", "-o", "/dev/stdout"], f"/dev/stdout: {NO_FILE}"),
+        (["simulate", "scene.toml", "-o", "/dev/none.gsd"], f"/dev/none.gsd: {NO_FILE}"),
         (["render", "none.gsd"], "none.gsd: no such file"),
         (["simulate", "full.toml"], f"full.toml: {TOO_LARGE}"),
         (["render", "full.toml"], f"full.toml: {TOO_LARGE}"),

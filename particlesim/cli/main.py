@@ -11,11 +11,12 @@ import typer
 from particlesim.cli.bench import measure_drawing, measure_steps
 from particlesim.cli.errors import fail, one_line_errors
 from particlesim.cli.options import MaxDrift, Quiet, SceneArgument, Threads
-from particlesim.cli.output import check_output, place_for
+from particlesim.cli.output import place_for
 from particlesim.cli.render import render
 from particlesim.cli.run import load, make_file
 from particlesim.cli.tables import print_report, print_table
 from particlesim.core.interrupts import raise_signals
+from particlesim.core.output_path import check_output
 
 app = typer.Typer(
     name="particlesim",
@@ -69,12 +70,11 @@ def simulate(
     max_drift: MaxDrift = None,
 ) -> None:
     """Simulate a scene and write its trajectory (GSD): no OpenGL, no movie."""
-    with one_line_errors(scene):
+    with one_line_errors(scene), place_for(output, scene, ".gsd") as path:
         loaded = load(scene)
         from particlesim.jobs.movie import simulate as write_trajectory  # noqa: PLC0415
 
-        with place_for(output, scene, ".gsd") as path:
-            make_file(write_trajectory, loaded, path, quiet, threads, max_drift)
+        make_file(write_trajectory, loaded, path, quiet, threads, max_drift)
 
 
 @app.command(short_help="Validate a scene and say what it amounts to.")
@@ -113,15 +113,15 @@ def compare(
     """
     if (source is None) == (sweep is None):
         fail("give a scene, a stream or --sweep, and one of them only", 2)
-    if stream is not None:
-        check_output(stream, ".aabb")
     with one_line_errors(source or Path("compare")):
+        if stream is not None:
+            check_output(stream, ".aabb")
         from particlesim.benchmarks.broad_phase.command import on_scene, on_stream, on_sweep  # noqa: PLC0415
         from particlesim.cli.progress import shown_progress  # noqa: PLC0415
 
         is_stream = source is not None and source.suffix.lower() == ".aabb"
         scene = load(source) if source is not None and not is_stream else None
-        with place_for(output, Path(f"compare_{source.stem if source else sweep}"), ".json") as path:
+        with place_for(output, Path(f"compare_{source.stem if source else sweep}"), ".json", ".svg", ".png") as path:
             with shown_progress(quiet, "particle" if sweep else "step") as progress:
                 settings: dict[str, Any] = {"limit": limit, "threads": threads, "progress": progress}
                 if scene is not None and source is not None:

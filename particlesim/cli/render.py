@@ -62,18 +62,21 @@ def render(
 ) -> None:
     """Simulate a scene, or read a trajectory, and make a movie of it, with a poster (PNG) beside it."""
     options = RenderOptions(frames, every, still, look, quality, size, camera, colour, scale)
-    with one_line_errors(source), _opened(source, options) as movable:
-        subject, scene, total = movable
+    suffixes = (".mp4", ".png") if still is None else (".png",)
+    with (
+        one_line_errors(source),
+        place_for(output, source, *suffixes) as path,
+        _opened(source, options) as (subject, scene, total),
+    ):
         time = still_time(scene.duration, options)
         chosen = None if time is not None else frames_asked(total, options)
         from particlesim.jobs import movie  # noqa: PLC0415
 
         if time is None:
-            make, suffix = partial(movie.render, look=scene, frames=chosen), ".mp4"
+            make = partial(movie.render, look=scene, frames=chosen)
         else:
-            make, suffix = partial(movie.still, look=scene, time=time), ".png"
-        with place_for(output, source, suffix) as path:
-            make_file(make, subject, path, quiet, threads, max_drift)
+            make = partial(movie.still, look=scene, time=time)
+        make_file(make, subject, path, quiet, threads, max_drift)
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from particlesim.core.output_path import check_output
 from particlesim.jobs.frame_source import (
     FrameSource,
     Progress,
@@ -38,8 +39,10 @@ def simulate(
 ) -> Summary:
     """Simulate ``scene`` and write its trajectory to ``path`` (GSD). Needs neither OpenGL nor ffmpeg.
 
-    SceneError if the scene cannot be built, SimulationError if it runs away, OSError if the file cannot be written.
+    OutputError for a path that no trajectory can be written to, SceneError if the scene cannot be built,
+    SimulationError if it runs away, OSError if the file cannot be written.
     """
+    check_output(path, ".gsd")
     simulation = start(scene, threads, progress)
     summary = _summary(scene, simulation.header)
     watch = _Stopwatch(summary)
@@ -66,6 +69,7 @@ def render(
     all if not given: a scene is simulated from its start to the last of them. Errors as for ``simulate``; RenderError
     if this machine cannot draw or encode; ValueError for frames that are not there.
     """
+    check_output(path, ".mp4", ".png")
     with opened(source) as movable:
         chosen = frame_source(movable, frames, threads, progress)
         scene = look or chosen.scene
@@ -89,6 +93,7 @@ def still(
 
     Otherwise like ``render``.
     """
+    check_output(path, ".png")
     with opened(source) as movable:
         chosen = frame_source_until(time, movable, threads, progress)
         with MovieJob(chosen, look or chosen.scene, progress) as job:
