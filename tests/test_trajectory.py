@@ -2,11 +2,13 @@
 
 from dataclasses import fields
 
+import gsd.fl
 import gsd.hoomd
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from particlesim.scene.file import SceneError
 from particlesim.simulation.simulation import Simulation
 from particlesim.trajectory.frames import Ledger
 from particlesim.trajectory.gsd_file import Trajectory, TrajectoryError, TrajectoryWriter
@@ -103,3 +105,103 @@ def test_other_files_are_refused_in_one_line(tmp_path):
         file.append(frame)
     with pytest.raises(TrajectoryError, match="older particlesim"):
         Trajectory(tmp_path / "old.gsd")
+
+
+def look_through(path):
+    """Everything that is in a trajectory."""
+    with Trajectory(path) as trajectory:
+        return (
+            trajectory.scene,
+            trajectory.header,
+            list(trajectory),
+            [trajectory.time(k) for k in range(len(trajectory))],
+        )
+
+
+def spoiled(path, chunk, values):
+    """A trajectory's copy with other values in one of its chunks, or without it if they are None."""
+    copy = path.with_name("spoiled.gsd")
+    with gsd.fl.open(str(path), "r") as old, gsd.fl.open(str(copy), "w", "a", "hoomd", [1, 4]) as new:
+        for k in range(old.nframes):
+            for name in old.find_matching_chunk_names(""):
+                if old.chunk_exists(k, name) and not (name == chunk and values is None):
+                    new.write_chunk(name, values if name == chunk else old.read_chunk(k, name))
+            new.end_frame()
+    return copy
+
+
+def text(words):
+    return np.frombuffer(words.encode(), dtype=np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("chunk", "values"),
+    [
+        ("log/particlesim/shapes", None),
+        ("log/particlesim/shapes", text("[{]")),
+        ("log/particlesim/shapes", text('[{"kind": 0}]')),
+        ("log/particlesim/scene", text('{"world": }')),
+        ("log/particlesim/scene", np.array([200, 201, 202], dtype=np.uint8)),
+        ("log/particlesim/scene", text('{"world": {"size": [3, 3, 3]}, "particles": [{"shape": "cube", "count": 1}]}')),
+        ("log/particlesim/shape", np.full(20, 99, dtype=np.int32)),
+        ("log/particlesim/shape", np.zeros(3, dtype=np.int32)),
+        ("log/particlesim/size", np.zeros(20)),
+        ("log/particlesim/group", np.full(20, 99, dtype=np.int32)),
+        ("log/particlesim/time", np.array([np.nan])),
+        ("log/particlesim/ledger/momentum", np.zeros(2)),
+        ("log/particlesim/ledger/impacts", np.array([np.nan])),
+        ("particles/position", np.full((20, 3), np.inf, dtype=np.float32)),
+        ("particles/position", np.zeros((19, 3), dtype=np.float32)),
+        ("particles/orientation", np.zeros((20, 4), dtype=np.float32)),
+        ("particles/mass", np.full(20, -1.0, dtype=np.float32)),
+    ],
+)
+def test_what_a_file_says_is_not_taken_for_granted(run, chunk, values):
+    look_through(spoiled(run[2], "no such chunk", None))
+    path = spoiled(run[2], chunk, values)
+    with pytest.raises(TrajectoryError) as error:
+        look_through(path)
+    assert str(error.value).startswith(f"{path}: damaged") and "\n" not in str(error.value)
+
+
+def test_a_file_without_a_number_of_the_ledger_is_an_older_one(run):
+    path = spoiled(run[2], "log/particlesim/ledger/virial", None)
+    with pytest.raises(TrajectoryError, match="written by an older particlesim; simulate its scene again"):
+        Trajectory(path)
+
+
+# Where in an index entry its frame, its rows and its columns are, each with more than there can be.
+@pytest.mark.parametrize(("at", "length", "value"), [(0, 8, 2**50), (8, 8, 2**40), (8, 8, 2**63), (24, 4, 2**31)])
+def test_sizes_are_checked_before_memory_is_asked_for(run, at, length, value):
+    content = bytearray(run[2].read_bytes())
+    begin = int.from_bytes(content[8:16], "little") + 32 * 5 + at
+    content[begin : begin + length] = value.to_bytes(length, "little")
+    run[2].write_bytes(content)
+    with pytest.raises(TrajectoryError, match="damaged: its index points to what is not there"):
+        look_through(run[2])
+
+
+def test_a_file_that_ends_early_is_damaged(run):
+    content = run[2].read_bytes()
+    for length in range(0, len(content), max(1, len(content) // 40)):
+        run[2].write_bytes(content[:length])
+        with pytest.raises(TrajectoryError) as error:
+            look_through(run[2])
+        assert "\n" not in str(error.value)
+
+
+def test_files_with_changed_bytes_are_read_or_refused_in_one_line(run):
+    rng = np.random.default_rng(1)
+    content = run[2].read_bytes()
+    outcomes = []
+    for _ in range(60):
+        changed = np.frombuffer(content, dtype=np.uint8).copy()
+        changed[rng.integers(0, len(changed), 200)] = rng.integers(0, 256, 200)
+        run[2].write_bytes(changed.tobytes())
+        try:
+            look_through(run[2])
+            outcomes.append("")
+        except (TrajectoryError, SceneError) as error:
+            outcomes.append(str(error))
+    assert all("\n" not in line for line in outcomes)
+    assert sum(bool(line) for line in outcomes) > 30

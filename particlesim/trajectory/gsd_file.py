@@ -11,7 +11,7 @@ import contextlib
 import functools
 import json
 from collections.abc import Iterator
-from dataclasses import fields
+from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -25,21 +25,32 @@ from particlesim.geometry.shapes import Shape, hull, sphere
 from particlesim.scene import Scene
 from particlesim.scene.file import parse_scene
 from particlesim.trajectory.frames import Frame, Header, Ledger
+from particlesim.trajectory.gsd_chunks import Chunks, TrajectoryError, reading
 
 # Other programs draw a shape for each type and do not scale it. Groups of more sizes than this get that many types,
 # evenly spread; the exact sizes are in the file as well.
 _MAX_SIZES = 64
 
-# GSD stores names of types in fixed-width fields and text as bytes.
-_LOG = "particlesim/"
+# What the schema does not have is among its logged quantities; text is stored as bytes. Under the second prefix OVITO
+# finds quantities of the particles.
+_LOG = "log/particlesim/"
 _LEDGER = _LOG + "ledger/"
+_IMPACTS = "log/particles/impacts"
 
-# Under this prefix OVITO finds quantities of the particles that the schema does not have.
-_IMPACTS = "particles/impacts"
+# Quantities of a particle, with what stands for those that are not in the file (the schema's defaults).
+_DEFAULTS: dict[str, tuple[float, ...]] = {
+    "position": (0.0, 0.0, 0.0),
+    "orientation": (1.0, 0.0, 0.0, 0.0),
+    "velocity": (0.0, 0.0, 0.0),
+    "angmom": (0.0, 0.0, 0.0, 0.0),
+    "image": (0.0, 0.0, 0.0),
+}
 
+# How far the square of a quaternion's length may be from 1: rounding to single precision leaves 1e-6.
+_UNIT = 1e-3
 
-class TrajectoryError(ValueError):
-    """A file that is not a trajectory of ours; the message is one line."""
+# How many numbers the vectors of a ledger are.
+_VECTORS = {"momentum": 3, "angular_momentum": 3, "wall_impulse": 6}
 
 
 class TrajectoryWriter:
@@ -82,10 +93,9 @@ class TrajectoryWriter:
             particles.mass = header.mass.astype(np.float32)
             particles.moment_inertia = header.inertia.astype(np.float32)
             particles.diameter = _display_diameters(header)
-            out.log.update(_header_log(header))
-        out.log[_IMPACTS] = frame.impacts.astype(np.uint32)
-        out.log[_LOG + "time"] = np.array([frame.time])
-        out.log.update(_ledger_log(frame.ledger))
+            out.log.update(_logged(_header_log(header)))
+        own = {_IMPACTS: frame.impacts.astype(np.uint32), _LOG + "time": np.array([frame.time])}
+        out.log.update(_logged({**own, **_ledger_log(frame.ledger)}))
         self._file.append(out)
         self._count += 1
 
@@ -95,31 +105,26 @@ class Trajectory:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        if not self.path.is_file():
-            raise TrajectoryError(f"{path}: no such file")
+        self._chunks = chunks = Chunks(self.path)
         try:
-            self._file = gsd.hoomd.open(str(path), "r")
-        except (OSError, RuntimeError):
-            raise TrajectoryError(f"{path}: not a GSD file, or cannot be read") from None
-        try:
-            self._first = self._file[0] if len(self._file) else None
-            if self._first is None or _LOG + "scene" not in self._first.log:
-                raise TrajectoryError(f"{path}: not written by particlesim, or without frames")
-            if _IMPACTS not in self._first.log:
-                raise TrajectoryError(f"{path}: written by an older particlesim; simulate its scene again")
-            self.header = _read_header(self._first)
+            with reading(self.path):
+                if not chunks.frames or not chunks.has(_LOG + "scene"):
+                    raise TrajectoryError(f"{path}: not written by particlesim, or without frames")
+                if not all(chunks.has(name) for name in (_IMPACTS, *_ledger_names())):
+                    raise TrajectoryError(f"{path}: written by an older particlesim; simulate its scene again")
+                self.header = _checked(_read_header(chunks))
         except BaseException:
-            self._file.close()
+            chunks.close()
             raise
 
     def __enter__(self) -> Trajectory:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._file.close()
+        self._chunks.close()
 
     def __len__(self) -> int:
-        return len(self._file)
+        return self._chunks.frames
 
     def __iter__(self) -> Iterator[Frame]:
         return (self[k] for k in range(len(self)))
@@ -127,27 +132,39 @@ class Trajectory:
     @functools.cached_property
     def scene(self) -> Scene:
         """The scene that the trajectory is of. SceneError if this version cannot read it."""
-        return parse_scene(json.loads(self.header.scene_json))
+        with reading(self.path):
+            table = json.loads(self.header.scene_json)
+        scene = parse_scene(table)
+        if len(self.header.group) != scene.number or (self.header.group >= len(scene.particles)).any():
+            raise TrajectoryError(f"{self.path}: damaged: its particles are not those of its scene")
+        return scene
 
     def time(self, k: int) -> float:
         """The time of frame ``k`` [s]."""
-        return float(self._file[k].log[_LOG + "time"][0])
+        with reading(self.path):
+            return float(self._chunks.rows(_LOG + "time", 1, (0.0,), k)[0, 0])
 
     def __getitem__(self, k: int) -> Frame:
         """Frame ``k``, 0 the first; positions and motion as the file stores them, in single precision."""
-        stored = self._file[k]
-        particles, log = stored.particles, stored.log
-        orientation = particles.orientation.astype(np.float64)
-        return Frame(
-            time=float(log[_LOG + "time"][0]),
-            position=particles.position.astype(np.float64),
-            orientation=orientation,
-            velocity=particles.velocity.astype(np.float64),
-            angular_momentum=_world_momentum(particles.angmom.astype(np.float64), orientation),
-            image=particles.image.astype(np.int64),
-            impacts=log[_IMPACTS].astype(np.int64),
-            ledger=_read_ledger(log),
-        )
+        if not 0 <= k < len(self):
+            raise IndexError(k)
+        with reading(self.path):
+            each = {
+                name: self._chunks.rows("particles/" + name, len(self.header.shape), default, k)
+                for name, default in _DEFAULTS.items()
+            }
+            if (np.abs((each["orientation"] ** 2).sum(axis=1) - 1.0) > _UNIT).any():
+                raise ValueError(f"orientations of frame {k}")
+            return Frame(
+                time=self.time(k),
+                position=each["position"],
+                orientation=each["orientation"],
+                velocity=each["velocity"],
+                angular_momentum=_world_momentum(each["angmom"], each["orientation"]),
+                image=each["image"].astype(np.int64),
+                impacts=self._chunks.rows(_IMPACTS, len(self.header.shape), (0.0,), k)[:, 0].astype(np.int64),
+                ledger=_read_ledger(self._chunks, k),
+            )
 
 
 def _display_types(header: Header) -> tuple[list[tuple[str, dict[str, Any]]], np.ndarray]:
@@ -198,18 +215,32 @@ def _header_log(header: Header) -> dict[str, np.ndarray]:
     }
 
 
-def _read_header(first: Any) -> Header:
-    log = first.log
-    described = json.loads(log[_LOG + "shapes"].tobytes())
+def _read_header(chunks: Chunks) -> Header:
+    described = json.loads(chunks.read(_LOG + "shapes").tobytes())
+    shape = chunks.read(_LOG + "shape").astype(np.int64)
     return Header(
-        scene_json=log[_LOG + "scene"].tobytes().decode(),
+        scene_json=chunks.read(_LOG + "scene").tobytes().decode(),
         shapes=tuple(sphere() if s["kind"] == SPHERE else hull(s["name"], s["vertices"]) for s in described),
-        shape=log[_LOG + "shape"].astype(np.int64),
-        size=log[_LOG + "size"],
-        group=log[_LOG + "group"].astype(np.int64),
-        mass=first.particles.mass.astype(np.float64),
-        inertia=first.particles.moment_inertia.astype(np.float64),
+        shape=shape,
+        size=chunks.rows(_LOG + "size", len(shape), (1.0,))[:, 0],
+        group=chunks.rows(_LOG + "group", len(shape), (0.0,))[:, 0].astype(np.int64),
+        mass=chunks.rows("particles/mass", len(shape), (1.0,))[:, 0],
+        inertia=chunks.rows("particles/moment_inertia", len(shape), (0.0, 0.0, 0.0)),
     )
+
+
+def _checked(header: Header) -> Header:
+    """The header. ValueError if a particle is of a shape that there is not, or of no size or mass."""
+    if not ((header.shape >= 0) & (header.shape < len(header.shapes)) & (header.group >= 0)).all():
+        raise ValueError("particles of unknown shapes or groups")
+    if not ((header.size > 0.0) & (header.mass > 0.0) & (header.inertia >= 0.0).all(axis=1)).all():
+        raise ValueError("particles without size, mass or inertia")
+    return header
+
+
+def _logged(chunks: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Chunks by the names that the writer of the schema gives logged quantities: without their prefix."""
+    return {name.removeprefix("log/"): values for name, values in chunks.items()}
 
 
 def _ledger_log(ledger: Ledger | None) -> dict[str, np.ndarray]:
@@ -220,14 +251,23 @@ def _ledger_log(ledger: Ledger | None) -> dict[str, np.ndarray]:
     return {_LEDGER + name: np.atleast_1d(value) for name, value in values.items() if value is not None}
 
 
-def _read_ledger(log: dict[str, np.ndarray]) -> Ledger:
-    """The ledger of a frame: of each field as many numbers as were written, one as a plain number."""
-    names = [field.name for field in fields(Ledger) if _LEDGER + field.name in log]
-    return Ledger(**{name: _plain(log[_LEDGER + name]) for name in names})
+def _ledger_names() -> list[str]:
+    """The chunks that every ledger has."""
+    return [_LEDGER + field.name for field in fields(Ledger) if field.default is MISSING]
 
 
-def _plain(value: np.ndarray) -> Any:
-    return value[0].item() if len(value) == 1 else value
+def _read_ledger(chunks: Chunks, k: int) -> Ledger:
+    """The ledger of a frame, by the names of its fields; those that may be unknown may be missing."""
+    known = [field for field in fields(Ledger) if field.default is MISSING or chunks.has(_LEDGER + field.name)]
+    return Ledger(**{field.name: _typed(chunks.read(_LEDGER + field.name, k), field) for field in known})
+
+
+def _typed(value: np.ndarray, field: Field[Any]) -> Any:
+    """The value of a field as its type says. ValueError if it is not as many numbers."""
+    if field.name in _VECTORS:
+        return value.astype(np.float64).reshape(_VECTORS[field.name])
+    (number,) = value.reshape(-1)
+    return int(number) if field.type == "int" else float(number)
 
 
 def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
