@@ -1,6 +1,7 @@
 """``--max-drift``: when it speaks, and what it leaves behind."""
 
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from particlesim.cli import main as cli
+from particlesim.cli.tables import print_summary
 from particlesim.jobs.summary import Summary
 from tests.worlds import ledger
 
@@ -94,3 +96,13 @@ def test_a_movie_of_a_trajectory_is_judged_by_its_ledger(folder, monkeypatch):
 def test_a_limit_that_is_none_is_refused(folder, value):
     assert run("simulate", "elastic.toml", "--max-drift", value).exit_code == 2
     assert not (folder / "renders").exists()
+
+
+def test_what_was_left_over_is_told(capsys):
+    made = Summary(1.0, np.zeros(3))
+    made.add(SimpleNamespace(ledger=ledger(kinetic_translational=1.0)))
+    print_summary(made, Path("run.gsd"))
+    assert "left over" not in capsys.readouterr().out
+    made.add(SimpleNamespace(ledger=ledger(time=1.0, kinetic_translational=1.0, unresolved=7)))
+    print_summary(made, Path("run.gsd"))
+    assert re.search(r"steps with impacts left over\W+7\b", capsys.readouterr().out)

@@ -37,10 +37,33 @@ _T = TypeVar("_T")
 def simulate(
     scene: Scene, path: str | Path, *, progress: Progress | None = None, threads: int | None = None
 ) -> Summary:
-    """Simulate ``scene`` and write its trajectory to ``path`` (GSD). Needs neither OpenGL nor ffmpeg.
+    """Simulate a scene and write its trajectory (GSD). Needs neither OpenGL nor ffmpeg.
 
-    OutputError for a path that no trajectory can be written to, SceneError if the scene cannot be built,
-    SimulationError if it runs away, OSError if the file cannot be written.
+    Parameters
+    ----------
+    scene
+        What to simulate, to its end.
+    path
+        The file, which must end in .gsd; it appears when it is whole.
+    progress
+        Called with what is going on, how many frames are done, and how many there will be.
+    threads
+        How many threads to simulate with; one a processor if None.
+
+    Returns
+    -------
+    What the run amounted to.
+
+    Raises
+    ------
+    OutputError
+        If no trajectory can be written to ``path``; found out before any work.
+    SceneError
+        If the scene cannot be built.
+    SimulationError
+        If the simulation runs away.
+    OSError
+        If the file cannot be written.
     """
     check_output(path, ".gsd")
     simulation = start(scene, threads, progress)
@@ -65,9 +88,33 @@ def render(
 ) -> Summary:
     """Make a movie (MP4) of a scene, simulating it, or of a trajectory, as it was; and a poster (PNG) beside it.
 
-    ``look`` draws a trajectory as this scene says, in place of its own; ``frames`` are the numbers of those to draw,
-    all if not given: a scene is simulated from its start to the last of them. Errors as for ``simulate``; RenderError
-    if this machine cannot draw or encode; ValueError for frames that are not there.
+    Parameters
+    ----------
+    source
+        A scene, a trajectory, or the path of a trajectory.
+    path
+        The movie, which must end in .mp4; it appears when it is whole.
+    look
+        Draws a trajectory as this scene says, in place of its own.
+    frames
+        Numbers of the frames to draw, all if None; a scene is simulated from its start to the last of them.
+    progress, threads
+        As for ``simulate``.
+
+    Returns
+    -------
+    What the run amounted to.
+
+    Raises
+    ------
+    RenderError
+        If this machine cannot draw or encode.
+    TrajectoryError
+        If the source is a file that is no trajectory, or damaged.
+    ValueError
+        For frames that are not there.
+    OutputError, SceneError, SimulationError, OSError
+        As for ``simulate``.
     """
     check_output(path, ".mp4", ".png")
     with opened(source) as movable:
@@ -89,9 +136,27 @@ def still(
     progress: Progress | None = None,
     threads: int | None = None,
 ) -> Summary:
-    """Make one picture (PNG): of a scene at ``time`` [s], simulating it until then, or of a trajectory's nearest frame.
+    """Make one picture (PNG) of a scene at a time, simulating it until then, or of a trajectory's nearest frame.
 
-    Otherwise like ``render``.
+    Parameters
+    ----------
+    source
+        A scene, a trajectory, or the path of a trajectory.
+    path
+        The picture, which must end in .png; it appears when it is whole.
+    time
+        Of the scene [s].
+    look, progress, threads
+        As for ``render``.
+
+    Returns
+    -------
+    What the run amounted to.
+
+    Raises
+    ------
+    OutputError, RenderError, TrajectoryError, SceneError, SimulationError, OSError
+        As for ``render``.
     """
     check_output(path, ".png")
     with opened(source) as movable:

@@ -47,9 +47,22 @@ class Ledger:
 class Header:
     """What stays the same from frame to frame.
 
-    ``scene_json``: the scene as JSON. ``shapes``: the shapes of size 1 that occur. Arrays (n,): ``shape`` index
-    into ``shapes``, ``size`` the factor on it, ``group`` the entry of the scene's particles, ``mass`` [kg].
-    ``inertia`` (n, 3): principal moments [kg m^2].
+    Attributes
+    ----------
+    scene_json
+        The scene as JSON.
+    shapes
+        The shapes of size 1 that occur.
+    shape : (n,) int64
+        Index into ``shapes`` of each particle.
+    size : (n,) float64
+        The factor on its shape: metres, as these are 1 m.
+    group : (n,) int64
+        Its entry of the scene's particles.
+    mass : (n,) float64
+        [kg]
+    inertia : (n, 3) float64
+        Principal moments [kg m^2].
     """
 
     scene_json: str
@@ -68,11 +81,26 @@ class Header:
 
 @dataclass(frozen=True)
 class Frame:
-    """The particles at one time [s].
+    """The particles at one time.
 
-    ``position`` (n, 3) [m], ``orientation`` (n, 4) quaternions (w, x, y, z) body to world, ``velocity`` (n, 3) [m/s],
-    ``angular_momentum`` (n, 3) about the centroids, world axes [kg m^2/s], ``image`` (n, 3) periods that a particle has
-    crossed, ``impacts`` (n,) of each since the start; ``ledger`` the sums over them, None where they are not known.
+    Attributes
+    ----------
+    time
+        [s]
+    position : (n, 3) float64
+        Of the centroids [m].
+    orientation : (n, 4) float64
+        Unit quaternions (w, x, y, z), body to world.
+    velocity : (n, 3) float64
+        [m/s]
+    angular_momentum : (n, 3) float64
+        About the centroids, world axes [kg m^2/s].
+    image : (n, 3) int64
+        Periods that each particle has crossed along each axis.
+    impacts : (n,) int64
+        Of each particle since the start.
+    ledger
+        The sums over all of them; None where they are not known.
     """
 
     time: float
