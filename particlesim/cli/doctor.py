@@ -10,11 +10,8 @@ import numba
 from particlesim.core.jit import CACHE_FOLDER
 from particlesim.rendering import RenderError, describe, describe_ffmpeg
 
-# For what is there but does not work; for what is not there, the errors say what to install.
-_REMEDY = {
-    "OpenGL": "install it with: apt-get install -y --no-install-recommends libegl1 libgl1",
-    "ffmpeg": "unset IMAGEIO_FFMPEG_EXE, or install it with: pip install --force-reinstall imageio-ffmpeg",
-}
+# For an ffmpeg that is there but does not work; all else that is missing says itself what to install.
+_FFMPEG_REMEDY = "unset IMAGEIO_FFMPEG_EXE, or install it with: pip install --force-reinstall imageio-ffmpeg"
 
 
 class Finding(NamedTuple):
@@ -36,6 +33,6 @@ def diagnose() -> list[Finding]:
         try:
             findings.append(Finding(what, True, look()))
         except RenderError as error:
-            remedy = "" if "install" in str(error) else f"; {_REMEDY[what]}"
+            remedy = "" if "install" in str(error) else f"; {_FFMPEG_REMEDY}"
             findings.append(Finding(what, False, f"{error}{remedy}"))
     return findings

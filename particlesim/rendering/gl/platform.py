@@ -7,14 +7,20 @@ import json
 import os
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from particlesim.rendering.errors import RenderError
 
-PLATFORMS = ("egl", "osmesa")
+WHEEL = "lavavu-osmesa"
+# In the order of trying: the system's libraries may have a GPU behind them, the wheel's have none. Each with the
+# platform that it is to PyOpenGL.
+SOURCES = {"egl": "egl", "osmesa": "osmesa", WHEEL: "osmesa"}
 FIX = "apt-get install -y --no-install-recommends libegl1 libgl1"
+if sys.platform == "linux" and os.uname().machine == "x86_64":
+    FIX = f"pip install --no-deps {WHEEL}, or: {FIX}"
 
 # Opening a context takes a fraction of a second; a driver that takes this long [s] hangs.
 _PATIENCE = 60.0
@@ -22,34 +28,51 @@ _PATIENCE = 60.0
 
 @dataclass(frozen=True)
 class Platform:
-    """A platform that opens contexts: its name, EGL device, and what its driver says of itself."""
+    """A platform that opens contexts: where it comes from, EGL device, and what its driver says of itself."""
 
-    name: str
+    source: str
     device: int | None
     vendor: str
     renderer: str
     version: str
+    passed_over: tuple[str, ...] = ()  # what was tried before it, each with the reason why it does not draw
+
+    @property
+    def name(self) -> str:
+        """What PyOpenGL calls it."""
+        return SOURCES[self.source]
 
 
 @functools.cache
 def choose() -> Platform:
-    """The platform to draw with: PYOPENGL_PLATFORM if set, else the first of EGL and OSMesa that opens a context.
+    """The platform to draw with: the first that opens a context of those that PYOPENGL_PLATFORM allows, if it is set.
 
-    The answer is kept for the process. RenderError, one line with the remedy, if none works.
+    The answer is kept for the process.
+
+    Raises
+    ------
+    RenderError
+        In one line with the remedy, if none works.
     """
+    reasons: list[str] = []
+    for source in _allowed():
+        found = _probe(source)
+        if isinstance(found, Platform):
+            return replace(found, passed_over=tuple(reasons))
+        reasons.append(f"{source}: {found}")
+    raise RenderError(f"cannot draw without OpenGL ({'; '.join(reasons)}): install it with: {FIX}")
+
+
+def _allowed() -> list[str]:
     wanted = os.environ.get("PYOPENGL_PLATFORM")
-    if wanted and wanted not in PLATFORMS:
+    allowed = [source for source, name in SOURCES.items() if wanted in (None, "", name)]
+    if not allowed:
+        names = ", ".join(dict.fromkeys(SOURCES.values()))
         raise RenderError(
-            f"PYOPENGL_PLATFORM is '{wanted}' but must be one of {', '.join(PLATFORMS)} to draw without a screen: "
+            f"PYOPENGL_PLATFORM is '{wanted}' but must be one of {names} to draw without a screen: "
             f"unset it, or install what is needed with: {FIX}"
         )
-    reasons = []
-    for name in (wanted,) if wanted else PLATFORMS:
-        found = _probe(name)
-        if isinstance(found, Platform):
-            return found
-        reasons.append(f"{name}: {found}")
-    raise RenderError(f"cannot draw without OpenGL ({'; '.join(reasons)}): install it with: {FIX}")
+    return allowed
 
 
 def open_bridge(found: Platform) -> Any:
@@ -57,16 +80,35 @@ def open_bridge(found: Platform) -> Any:
     # PyOpenGL reads the platform here, at its first import and never again.
     os.environ["PYOPENGL_PLATFORM"] = found.name
     try:
+        if found.source == WHEEL:
+            from OpenGL.plugins import PlatformPlugin  # noqa: PLC0415
+
+            PlatformPlugin.by_name("osmesa").import_path = "particlesim.rendering.gl.wheel_osmesa.WheelOSMesa"
         from particlesim.rendering.gl import pyrender_bridge  # noqa: PLC0415
     except (ImportError, AttributeError, OSError) as error:
         raise RenderError(f"cannot draw: {_one_line(str(error))}; install what OpenGL needs with: {FIX}") from error
     return pyrender_bridge
 
 
+def wheel_folder() -> str | None:
+    """The folder of the libraries in the wheel with libOSMesa, or None if the wheel is not installed."""
+    try:
+        return str(metadata.distribution(WHEEL).locate_file("lavavu_osmesa.libs"))
+    except metadata.PackageNotFoundError:
+        return None
+
+
 def describe() -> str:
-    """One line on the OpenGL that pictures are drawn with. RenderError as for ``choose``."""
+    """One line on the OpenGL that pictures are drawn with, and why with this one. RenderError as for ``choose``."""
     found = choose()
-    return f"{found.name}, {found.renderer}, {found.vendor}, OpenGL {found.version}"
+    origin = f"the wheel {WHEEL}" if found.source == WHEEL else "the system"
+    return f"{found.name} of {origin}, {found.renderer}, {found.vendor}, OpenGL {found.version} ({_why(found)})"
+
+
+def _why(found: Platform) -> str:
+    if found.passed_over:
+        return "as others do not draw: " + "; ".join(found.passed_over)
+    return "as PYOPENGL_PLATFORM says" if os.environ.get("PYOPENGL_PLATFORM") else "tried first"
 
 
 def describe_ffmpeg() -> str:
@@ -89,9 +131,12 @@ def ffmpeg() -> str:
         raise RenderError("no ffmpeg: install it with: pip install imageio-ffmpeg") from error
 
 
-def _probe(name: str) -> Platform | str:
-    """What a child process finds on the platform, or why it found nothing."""
-    command = [sys.executable, "-I", str(Path(__file__).with_name("probe.py")), name]
+def _probe(source: str) -> Platform | str:
+    """What a child process finds at a source, or why it found nothing."""
+    folder = wheel_folder() if source == WHEEL else ""
+    if folder is None:
+        return "not installed"
+    command = [sys.executable, "-I", str(Path(__file__).with_name("probe.py")), SOURCES[source], folder]
     try:
         child = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, check=False)
     except subprocess.TimeoutExpired:
@@ -100,7 +145,7 @@ def _probe(name: str) -> Platform | str:
     if child.returncode != 0 or not lines:
         return f"its driver crashes (exit status {child.returncode})"
     answer = json.loads(lines[-1])
-    return _one_line(answer["error"]) if "error" in answer else Platform(name=name, **answer)
+    return _one_line(answer["error"]) if "error" in answer else Platform(source, **answer)
 
 
 def _one_line(text: str) -> str:

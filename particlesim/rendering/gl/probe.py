@@ -6,6 +6,7 @@ that the child starts at once.
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import json
 import os
@@ -67,9 +68,18 @@ def _egl_context(egl: Any, display: Any) -> bool:
     return bool(context and egl.eglMakeCurrent(display, None, None, ctypes.c_void_p(context)))
 
 
+def _load_any(*names: str) -> None:
+    """Load the first of the libraries that is there. OSError if none is."""
+    for name in names:
+        with contextlib.suppress(OSError):
+            ctypes.CDLL(name, mode=ctypes.RTLD_GLOBAL)
+            return
+    raise OSError(f"neither of {', '.join(names)} loads")
+
+
 def probe_egl() -> dict[str, Any]:
     """The first EGL device on which a context opens; a driver lists its software device last. OSError if none."""
-    ctypes.CDLL("libGL.so.1", mode=ctypes.RTLD_GLOBAL)
+    _load_any("libOpenGL.so.0", "libGL.so.1")
     egl = ctypes.CDLL("libEGL.so.1", mode=ctypes.RTLD_GLOBAL)
     egl.eglGetProcAddress.restype = ctypes.c_void_p
     egl.eglCreateContext.restype = ctypes.c_void_p
@@ -90,9 +100,42 @@ def probe_egl() -> dict[str, Any]:
     raise OSError("EGL is installed but no device of it opens an OpenGL 4.1 context")
 
 
-def probe_osmesa() -> dict[str, Any]:
-    """An OSMesa context. OSError if there is none."""
-    mesa = ctypes.CDLL("libOSMesa.so.8", mode=ctypes.RTLD_GLOBAL)
+def load_folder(folder: str, name: str) -> ctypes.CDLL:
+    """Load all libraries in a folder, and return the one whose file's name starts with ``name``.
+
+    Libraries in a wheel ask for each other by names of their own, but do not say where the others are: each loads once
+    those that it asks for are loaded.
+
+    Raises
+    ------
+    OSError
+        If one does not load, or none has that name.
+    """
+    waiting = sorted(entry.path for entry in os.scandir(folder))
+    loaded: dict[str, ctypes.CDLL] = {}
+    while waiting:
+        reasons = {path: error for path in waiting if (error := _load_into(loaded, path))}
+        if len(reasons) == len(waiting):
+            raise reasons[waiting[0]]
+        waiting = list(reasons)
+    for path, library in loaded.items():
+        if os.path.basename(path).startswith(name):
+            return library
+    raise OSError(f"{folder} holds no {name}")
+
+
+def _load_into(loaded: dict[str, ctypes.CDLL], path: str) -> OSError | None:
+    """Load a library, for itself alone: its names are not those of the system's. The error if it does not load."""
+    try:
+        loaded[path] = ctypes.CDLL(path)
+    except OSError as error:
+        return error
+    return None
+
+
+def probe_osmesa(folder: str) -> dict[str, Any]:
+    """An OSMesa context, of the libraries in a folder if one is given. OSError if there is none."""
+    mesa = load_folder(folder, "libOSMesa") if folder else ctypes.CDLL("libOSMesa.so.8", mode=ctypes.RTLD_GLOBAL)
     mesa.OSMesaCreateContextAttribs.restype = ctypes.c_void_p
     mesa.OSMesaGetProcAddress.restype = ctypes.c_void_p
     version = (OSMESA_CONTEXT_MAJOR_VERSION, 3, OSMESA_CONTEXT_MINOR_VERSION, 3)
@@ -107,7 +150,7 @@ def probe_osmesa() -> dict[str, Any]:
 
 if __name__ == "__main__":
     try:
-        answer = {"egl": probe_egl, "osmesa": probe_osmesa}[sys.argv[1]]()
+        answer = probe_egl() if sys.argv[1] == "egl" else probe_osmesa(sys.argv[2])
     except OSError as error:
         answer = {"error": str(error)}
     print(json.dumps(answer), flush=True)
