@@ -3,13 +3,16 @@
 import os
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
 
+from particlesim.jobs import frame_source, movie
 from particlesim.rendering import RenderError
 from particlesim.rendering.gl import platform
 from particlesim.rendering.gl.probe import load_folder
+from particlesim.scene import Scene
 
 DRAW = """
 import numpy as np
@@ -87,6 +90,14 @@ def test_machine_without_opengl_is_one_line_with_the_remedy(probed):
         platform.choose()
     assert str(error.value).endswith(platform.FIX) and "\n" not in str(error.value)
     assert "egl: not installed; osmesa: not installed; lavavu-osmesa: not installed" in str(error.value)
+
+
+@pytest.mark.parametrize(("make", "name"), [(movie.render, "a.mp4"), (partial(movie.still, time=1.0), "a.png")])
+def test_a_machine_that_cannot_draw_is_found_out_before_any_work(make, name, probed, monkeypatch, tmp_path):
+    probed()
+    monkeypatch.setattr(frame_source, "start", lambda *_: pytest.fail("works"))
+    with pytest.raises(RenderError, match="cannot draw"):
+        make(Scene(world={"size": (2, 2, 2)}, particles=[{"shape": "sphere", "count": 1}]), tmp_path / name)
 
 
 def found(source):

@@ -23,6 +23,7 @@ from particlesim.jobs.frame_source import (
 )
 from particlesim.jobs.summary import Summary
 from particlesim.rendering import Renderer, write_image, write_movie
+from particlesim.rendering.gl import platform
 from particlesim.rendering.hud.history import History
 from particlesim.rendering.look import look_of
 from particlesim.rendering.shading.colour import encoded
@@ -108,7 +109,7 @@ def render(
     Raises
     ------
     RenderError
-        If this machine cannot draw or encode.
+        If this machine cannot draw, found out before any work, or cannot encode.
     TrajectoryError
         If the source is a file that is no trajectory, or damaged.
     ValueError
@@ -118,6 +119,7 @@ def render(
     """
     check_output(path, ".mp4", ".png")
     with opened(source) as movable:
+        platform.choose()
         chosen = frame_source(movable, frames, threads, progress)
         scene = look or chosen.scene
         with MovieJob(chosen, scene, progress) as job:
@@ -160,6 +162,7 @@ def still(
     """
     check_output(path, ".png")
     with opened(source) as movable:
+        platform.choose()
         chosen = frame_source_until(time, movable, threads, progress)
         with MovieJob(chosen, look or chosen.scene, progress) as job:
             for _ in job.images():

@@ -8,7 +8,6 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass, replace
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -92,6 +91,8 @@ def open_bridge(found: Platform) -> Any:
 
 def wheel_folder() -> str | None:
     """The folder of the libraries in the wheel with libOSMesa, or None if the wheel is not installed."""
+    from importlib import metadata  # noqa: PLC0415  (costs time that commands without a picture need not pay)
+
     try:
         return str(metadata.distribution(WHEEL).locate_file("lavavu_osmesa.libs"))
     except metadata.PackageNotFoundError:
