@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from particlesim.broad_phase import find_pairs, octree_leaves
+from particlesim.broad_phase import METHODS, find_pairs, octree_leaves
 
 
 class TestGate:
@@ -16,10 +16,48 @@ class TestGate:
     def test_method(self):
         self.bad("unknown method 'kd-tree', expected one of naive, grid, octree", method="kd-tree")
 
-    @pytest.mark.parametrize("wrong", [np.zeros(3), np.zeros((3, 2)), np.zeros((3, 3), dtype=np.float32)])
-    def test_shape_and_type(self, wrong):
+    @pytest.mark.parametrize("wrong", [np.zeros(3), np.zeros((3, 2)), 5.0, []])
+    def test_shape(self, wrong):
         self.bad(r"lower must be \(n, 3\) float64", lower=wrong)
         self.bad(r"upper must be \(n, 3\) float64", upper=wrong)
+
+    @pytest.mark.parametrize(
+        "wrong", [np.zeros((3, 3), dtype=complex), [["a"] * 3] * 3, [[0, 0, 0], [0, 0]], None, [[None] * 3] * 3]
+    )
+    def test_type(self, wrong):
+        self.bad("find_pairs: lower must be real numbers", lower=wrong)
+        self.bad("find_pairs: upper must be real numbers", upper=wrong)
+        if wrong is not None:
+            self.bad("find_pairs: period must be real numbers", period=wrong)
+
+    @pytest.mark.parametrize("dtype", [np.float32, np.float16, np.int8, np.uint64, list])
+    @pytest.mark.parametrize("method", METHODS)
+    def test_whatever_numpy_makes_numbers_of(self, dtype, method):
+        lower = np.random.default_rng(1).integers(0, 9, (40, 3)).astype(np.float64)
+        expected = find_pairs(lower, lower + 2.0, method, period=(8.0, 0.0, 8.0))
+        given, wide = lower.astype(float if dtype is list else dtype), 2.0 if dtype is list else dtype(2)
+        upper, period = given + wide, np.array([8, 0, 8])
+        if dtype is list:
+            given, upper, period = given.tolist(), upper.tolist(), (8, 0, 8)
+        found = find_pairs(given, upper, method, period=period)
+        assert found.dtype == np.int64
+        np.testing.assert_array_equal(found, expected)
+
+    @pytest.mark.parametrize("method", METHODS)
+    def test_threads_are_the_calls_own(self, method):
+        lower = np.random.default_rng(2).random((5000, 3))
+        expected = find_pairs(lower, lower + 0.02, method)
+        for threads in (1, 2, 3, np.int64(2)):
+            np.testing.assert_array_equal(find_pairs(lower, lower + 0.02, method, threads=threads), expected)
+        self.bad("find_pairs: the number of threads must be at least 1, not 0", method=method, threads=0)
+
+    def test_unknown_and_odd_parameters(self):
+        for method, known in (("naive", "threads"), ("grid", "cells"), ("octree", "max_count, max_depth")):
+            with pytest.raises(TypeError, match=f"find_pairs: unknown parameter 'cell' of {method}.*{known}"):
+                find_pairs(self.GOOD, self.GOOD, method, cell=3)
+        for name, value in (("cells", 2.5), ("threads", "2"), ("threads", True)):
+            with pytest.raises(TypeError, match=f"find_pairs: {name} must be a whole number, got {value!r}"):
+                find_pairs(self.GOOD, self.GOOD, "grid", **{name: value})
 
     def test_number(self):
         self.bad("lower has 2 boxes, upper has 3", lower=np.zeros((2, 3)))

@@ -1,18 +1,18 @@
-"""Broad phase: which boxes overlap, and so which particles may touch.
+"""Broad phase: which axis-aligned bounding boxes overlap, and so which particles may touch.
 
-The contract.  ``lower`` and ``upper`` (n, 3) float64 [m] are the corners of n axis-aligned boxes.  A broad phase
-returns all pairs i < j of boxes that overlap, each once, sorted by (i, j), as an (m, 2) int64 array.  Boxes are
-closed: touching counts, a box may be flat or a point, boxes may coincide.  Sizes may differ by any factor and boxes
-lie anywhere.  ``period`` (3,) [m] is the edge of the world on an axis that wraps, 0 on one that does not; on an axis
-that wraps, boxes overlap if they do after a shift by some whole number of periods.
+The contract.  ``lower`` and ``upper`` (n, 3) float64 [m] are the corners of n axis-aligned bounding boxes (AABBs).  A
+broad phase returns all pairs i < j of AABBs that overlap, each once, sorted by (i, j), as an (m, 2) int64 array.
+AABBs are closed: touching counts, one may be flat or a point, they may coincide.  Sizes may differ by any factor and
+AABBs lie anywhere.  ``period`` (3,) [m] is the edge of the world on an axis that wraps, 0 on one that does not; on an
+axis that wraps, AABBs overlap if they do after a shift by some whole number of periods.
 
 Every method gives the same array, to the last entry, for any number of threads: all of them decide by the one test
-``pairs.boxes_overlap``, and a method only leaves out pairs that cannot pass it.  Nothing is dropped: lists that are
-too short are made longer and filled again.
+``aabb_test.aabbs_overlap``, and a method only leaves out pairs that cannot pass it.  Nothing is dropped: lists that
+are too short are made longer and filled again.
 
-A method is a callable ``(lower, upper, period, **parameters) -> (pairs, tested)`` in ``METHODS``; ``tested`` is the
-number of box tests it made.  It trusts its arrays (C-contiguous, writable, float64, as ``find_pairs`` checks them);
-the simulation calls it directly.
+A method is a callable ``(lower, upper, period, *, threads=None, **parameters) -> (pairs, tested)`` in ``METHODS``;
+``tested`` is the number of AABB tests it made.  It trusts its arrays (C-contiguous, writable, float64, as
+``find_pairs`` checks them); the simulation calls it directly.
 
     naive   every pair                                                      no parameters
     grid    uniform cells                                                   cells=None (an int: so many along each axis)
@@ -21,10 +21,12 @@ the simulation calls it directly.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import inspect
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from particlesim.broad_phase.grid import grid_pairs
 from particlesim.broad_phase.naive import naive_pairs
@@ -46,23 +48,47 @@ _MOST_PERIODS = 2.0**32
 
 
 def find_pairs(
-    lower: np.ndarray,
-    upper: np.ndarray,
+    lower: ArrayLike,
+    upper: ArrayLike,
     method: str = "octree",
     *,
-    period: Sequence[float] | np.ndarray | None = None,
+    period: ArrayLike | None = None,
+    threads: int | None = None,
     **parameters: Any,
 ) -> np.ndarray:
-    """Pairs of axis-aligned boxes that overlap: (m, 2) int64, i < j, each once, sorted by (i, j).
+    """Pairs of axis-aligned bounding boxes (AABBs) that overlap.
 
-    ``lower``, ``upper`` (n, 3) float64 [m], lower <= upper; ``method`` one of ``METHODS``, with its ``parameters``;
-    ``period`` None or (3,) [m], 0 on axes that do not wrap.  The contract is at the top of this module.
+    AABBs are closed: touching counts.
 
-    Raises ``ValueError`` for an unknown method, arrays of another shape or type, boxes that are not finite or whose
-    lower corner exceeds the upper one, and parameters out of range.
+    Parameters
+    ----------
+    lower, upper : array_like (n, 3), converted to float64
+        Corners of the AABBs [m], ``lower <= upper``.
+    method : str
+        One of ``METHODS``: ``"naive"``, ``"grid"`` or ``"octree"``.  All give the same array.
+    period : array_like (3,), optional
+        Edges of a periodic world [m], 0 on axes that do not wrap; by default no axis does.
+    threads : int, optional
+        How many threads to search with; by default as many as there are processors.  The result does not depend on it.
+    **parameters
+        Of the method: ``cells`` of ``"grid"``, ``max_count`` and ``max_depth`` of ``"octree"``.
+
+    Returns
+    -------
+    numpy.ndarray (m, 2) int64
+        Numbers i < j of the AABBs of each pair, each pair once, sorted by (i, j).
+
+    Raises
+    ------
+    ValueError
+        For an unknown method, arrays of another shape or that are no numbers, AABBs that are not finite or whose lower
+        corner exceeds the upper one, and parameters out of range.
+    TypeError
+        For a parameter that the method does not have, or one that is no whole number.
     """
     if method not in METHODS:
         raise ValueError(f"find_pairs: unknown method {method!r}, expected one of {', '.join(METHODS)}")
+    numbers = _checked_parameters(method, {"threads": threads, **parameters})
     low, high = _checked("lower", lower), _checked("upper", upper)
     if low.shape != high.shape:
         raise ValueError(f"find_pairs: lower has {len(low)} boxes, upper has {len(high)}")
@@ -73,14 +99,39 @@ def find_pairs(
     wraps = lengths > 0.0
     if len(low) and (np.maximum(-low, high).max(axis=0)[wraps] > _MOST_PERIODS * lengths[wraps]).any():
         raise ValueError("find_pairs: boxes lie more than 2**32 periods from the origin")
-    pairs, _ = METHODS[method](low, high, lengths, **parameters)
+    try:
+        pairs, _ = METHODS[method](low, high, lengths, **numbers)
+    except ValueError as error:
+        raise ValueError(f"find_pairs: {error}") from None
     return pairs
 
 
-def _checked(name: str, values: np.ndarray) -> np.ndarray:
-    array = np.asarray(values)
-    if array.ndim != 2 or array.shape[1] != 3 or array.dtype != np.float64:
-        raise ValueError(f"find_pairs: {name} must be (n, 3) float64, got {array.shape} {array.dtype}")
+def _checked_parameters(method: str, parameters: dict[str, Any]) -> dict[str, int | None]:
+    """The parameters as whole numbers of Python. TypeError if one is none, or the method does not have it."""
+    known = [p.name for p in inspect.signature(METHODS[method]).parameters.values() if p.kind is p.KEYWORD_ONLY]
+    for name, value in parameters.items():
+        if name not in known:
+            raise TypeError(f"find_pairs: unknown parameter {name!r} of {method}, expected one of {', '.join(known)}")
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int | np.integer)):
+            raise TypeError(f"find_pairs: {name} must be a whole number, got {value!r}")
+    return {name: None if value is None else int(value) for name, value in parameters.items()}
+
+
+def _as_float64(name: str, values: ArrayLike) -> np.ndarray:
+    """``values`` as float64. ValueError if they are no real numbers."""
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind not in "biuf":
+            raise TypeError(array.dtype)
+        return array.astype(np.float64, copy=False)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"find_pairs: {name} must be real numbers, got {' '.join(str(error).split())}") from None
+
+
+def _checked(name: str, values: ArrayLike) -> np.ndarray:
+    array = _as_float64(name, values)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"find_pairs: {name} must be (n, 3) float64, got {array.shape}")
     wrong = np.flatnonzero(~(np.abs(array) <= _FARTHEST).all(axis=1))
     if wrong.size:
         raise ValueError(
@@ -89,8 +140,8 @@ def _checked(name: str, values: np.ndarray) -> np.ndarray:
     return np.require(array, requirements=["C", "W"])
 
 
-def _checked_period(period: Sequence[float] | np.ndarray | None) -> np.ndarray:
-    lengths = np.zeros(3) if period is None else np.array(period, dtype=np.float64)
+def _checked_period(period: ArrayLike | None) -> np.ndarray:
+    lengths = np.zeros(3) if period is None else np.array(_as_float64("period", period))
     if lengths.shape != (3,) or not ((lengths >= 0.0) & (lengths <= _FARTHEST)).all():
-        raise ValueError(f"find_pairs: period must be three lengths, 0 on axes that do not wrap, got {period}")
+        raise ValueError(f"find_pairs: period must be three lengths, 0 on axes that do not wrap, got {period!r}")
     return lengths

@@ -1,17 +1,15 @@
-"""Where the boxes are and how large: what grid and octree are laid out by."""
+"""Where the AABBs are and how large: what grid and octree are laid out by."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from particlesim.broad_phase.aabb_test import SLACK
+from particlesim.broad_phase.aabb_test import SLACK, Aabbs
 from particlesim.core.jit import kernel
 from particlesim.core.parallel import ThreadTeam
 
-# The typical place and size are taken from this many boxes, picked by multiples of a prime modulo the number of
-# boxes: no pattern in the order of the particles is met in step.
+# The typical place and size are taken from this many AABBs, picked by multiples of a prime modulo their number:
+# no pattern in the order of the particles is met in step.
 SAMPLE = 64
 _PRIME = 2654435761
 
@@ -19,18 +17,22 @@ _PRIME = 2654435761
 # of the cells of all.
 _TAIL = 2
 
-# Boxes looked at before the next axis is: 24 kB of corners.
+# AABBs looked at before the next axis is: 24 kB of corners.
 _BLOCK = 512
 
 
-class Survey(NamedTuple):
-    """Each (3,) float64 [m], and ``typical`` a float [m]."""
-
-    region_lower: np.ndarray  # most centres lie in the region; on a periodic axis it is 0 .. period
-    region_upper: np.ndarray
-    widest: np.ndarray  # the largest width of a box along each axis
-    slack: np.ndarray  # bound on the rounding of coordinates
-    typical: float  # the median of the boxes' longest edges, by the sample
+STATISTICS = np.dtype(
+    [
+        ("region_lower", "f8", (3,)),  # most centres lie in the region; on a periodic axis it is 0 .. period [m]
+        ("region_upper", "f8", (3,)),  # [m]
+        ("widest", "f8", (3,)),  # the largest width of an AABB along each axis [m]
+        ("slack", "f8", (3,)),  # bound on the rounding of coordinates [m]
+        ("longest", "f8"),  # the longest edge of any AABB [m]
+        ("typical", "f8"),  # the median of the longest edges, by the sample [m]
+        ("scale", "f8"),  # one over the longest edge of the region [1/m]; 0 for a point
+    ],
+    align=True,
+)
 
 
 @kernel
@@ -43,11 +45,12 @@ def wrapped_centre(lower, upper, period):
 
 
 @kernel
-def _extremes(first, last, lower, upper, period, result):
+def _extremes(first, last, aabbs, result):
     """Rows of ``result`` (4, 3): -smallest and largest centre, largest width, largest absolute coordinate.
 
-    On a periodic axis the centres are left out.  By blocks that stay in the fastest cache while the axes take turns.
+    On a periodic axis the centres are left out.  By blocks that stay in the fastest cache while the axes alternate.
     """
+    lower, upper, period = aabbs
     result[0:2] = -np.inf
     result[2:4] = 0.0
     for block in range(first, last, _BLOCK):
@@ -82,51 +85,72 @@ def _insert(sample, size, value):
 
 
 @kernel
-def _typical(lower, upper, period, result):
-    """``result`` (3, 3): where most centres start, and end; the median longest edge in all of row 2."""
+def _sample_centres(aabbs, axis, sample):
+    """Centres along an axis of as many AABBs as ``sample`` is long, sorted."""
+    lower, upper, period = aabbs
     count = lower.shape[0]
-    size = min(count, SAMPLE)
-    tail = _TAIL * size // SAMPLE
-    sample = np.empty(size)
-    for axis in range(3):
-        for turn in range(size):
-            index = turn * _PRIME % count if count > SAMPLE else turn
-            _insert(sample, turn, wrapped_centre(lower[index, axis], upper[index, axis], period[axis]))
-        result[0, axis] = sample[tail]
-        result[1, axis] = sample[size - 1 - tail]
-    for turn in range(size):
-        index = turn * _PRIME % count if count > SAMPLE else turn
-        width = 0.0
-        for axis in range(3):
-            width = max(width, upper[index, axis] - lower[index, axis])
-        _insert(sample, turn, width)
-    result[2, :] = sample[size // 2]
+    for pick in range(sample.size):
+        index = pick * _PRIME % count if count > SAMPLE else pick
+        _insert(sample, pick, wrapped_centre(lower[index, axis], upper[index, axis], period[axis]))
 
 
 @kernel
-def _region(extremes, typical, period, region):
-    """``region`` (2, 3): the typical centres with a quarter more on either side, inside the extremes."""
+def _sample_edges(aabbs, sample):
+    """Longest edges of the same AABBs, sorted."""
+    lower, upper, _ = aabbs
+    count = lower.shape[0]
+    for pick in range(sample.size):
+        index = pick * _PRIME % count if count > SAMPLE else pick
+        width = 0.0
+        for axis in range(3):
+            width = max(width, upper[index, axis] - lower[index, axis])
+        _insert(sample, pick, width)
+
+
+@kernel
+def _region_along(low, high, period, sample):
+    """Where most centres are along an axis: those of the sample with a quarter more on either side, in the extremes."""
+    if period > 0.0:
+        return 0.0, period
+    tail = _TAIL * sample.size // SAMPLE
+    first, last = sample[tail], sample[sample.size - 1 - tail]
+    margin = 0.25 * (last - first)
+    if margin > 0.0:
+        low = max(low, first - margin)
+        high = min(high, last + margin)
+    return low, high
+
+
+@kernel
+def _summarise(aabbs, parts, statistics):
+    """The statistics from the extremes of each thread's part (see ``_extremes``)."""
+    result = statistics[0]
+    for thread in range(1, parts.shape[0]):
+        for row in range(4):
+            for axis in range(3):
+                parts[0, row, axis] = max(parts[0, row, axis], parts[thread, row, axis])
+    sample = np.empty(min(aabbs.lower.shape[0], SAMPLE))
+    edge = 0.0
+    result.longest = 0.0
     for axis in range(3):
-        low = -extremes[0, axis]
-        high = extremes[1, axis]
-        if period[axis] > 0.0:
-            low = 0.0
-            high = period[axis]
-        else:
-            margin = 0.25 * (typical[1, axis] - typical[0, axis])
-            if margin > 0.0:
-                low = max(low, typical[0, axis] - margin)
-                high = min(high, typical[1, axis] + margin)
-        region[0, axis] = low
-        region[1, axis] = high
+        period = aabbs.period[axis]
+        _sample_centres(aabbs, axis, sample)
+        low, high = _region_along(-parts[0, 0, axis], parts[0, 1, axis], period, sample)
+        result.region_lower[axis] = low
+        result.region_upper[axis] = high
+        result.widest[axis] = parts[0, 2, axis]
+        result.slack[axis] = SLACK * (parts[0, 3, axis] + period)
+        result.longest = max(result.longest, result.widest[axis])
+        edge = max(edge, high - low)
+    result.scale = 1.0 / edge if edge > 1e-300 else 0.0
+    _sample_edges(aabbs, sample)
+    result.typical = sample[sample.size // 2]
 
 
-def survey(lower: np.ndarray, upper: np.ndarray, period: np.ndarray, crew: ThreadTeam) -> Survey:
-    """Look at all boxes once.  ``lower``, ``upper`` (n, 3) float64 [m], n > 0; ``period`` (3,) [m]."""
-    parts = np.empty((crew.threads, 4, 3))
-    crew.each(lambda thread, a, b: _extremes(a, b, lower, upper, period, parts[thread]), len(lower))
-    extremes = parts.max(axis=0)
-    typical, region = np.empty((3, 3)), np.empty((2, 3))
-    _typical(lower, upper, period, typical)
-    _region(extremes, typical, period, region)
-    return Survey(region[0], region[1], extremes[2], SLACK * (extremes[3] + period), typical[2, 0])
+def aabb_statistics(aabbs: Aabbs, team: ThreadTeam) -> np.ndarray:
+    """``STATISTICS`` (1,) of all AABBs, one or more, which are looked at once."""
+    parts = np.empty((team.threads, 4, 3))
+    team.each(lambda thread, first, last: _extremes(first, last, aabbs, parts[thread]), len(aabbs.lower))
+    statistics = np.empty(1, dtype=STATISTICS)
+    _summarise(aabbs, parts, statistics)
+    return statistics

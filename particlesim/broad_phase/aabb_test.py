@@ -1,15 +1,14 @@
-"""What every broad phase shares: the box test, and the list of the pairs that pass it.
+"""What every broad phase shares: the records that hold AABBs, the overlap test, and the list of pairs that pass it.
 
-A method stores its boxes as rows ``(lower x y z, upper x y z)`` of an (n, 6) float64 array in the order that suits
-it, and ``order`` (n,) int32 gives the number of each in the caller's arrays.  It writes the candidates it finds, as
-two rows each, to a short list, and ``append_overlaps`` decides them all in one loop without a branch: where pairs
-are few and irregular, a branch for each costs more than the test.  A found pair is one int64 key, ``i << 32 | j``
-with i < j.
+A method stores AABBs in an order that suits it (``StoredAabbs``).  It writes the candidates it finds, as two rows
+each, to a short list, and ``append_overlaps`` decides them all in one loop without a branch: where pairs are few and
+irregular, a branch for each costs more than the test.  A found pair is one int64 key, ``i << 32 | j`` with i < j.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,15 +25,31 @@ BLOCKS_PER_THREAD = 16
 _MORE = 1.1
 
 # Rounding of coordinates and of their differences, relative to the largest coordinate: 32 units in the last place.
-# Wherever a method sorts boxes by rounded numbers, it widens its reach by this.
+# Wherever a method sorts AABBs by rounded numbers, it widens its reach by this.
 SLACK = 2.0**-47
 
 
+class Aabbs(NamedTuple):
+    """AABBs as the caller gives them."""
+
+    lower: np.ndarray  # (n, 3) float64 [m]
+    upper: np.ndarray  # (n, 3) float64 [m]
+    period: np.ndarray  # (3,) float64 [m], 0 on axes that do not wrap
+
+
+class StoredAabbs(NamedTuple):
+    """AABBs in the order of a method."""
+
+    bounds: np.ndarray  # (n, 6) float64, lower x y z, upper x y z [m]
+    order: np.ndarray  # (n,) int32, the number of each in the caller's arrays
+    period: np.ndarray  # (3,) float64 [m], 0 on axes that do not wrap
+
+
 @kernel
-def row_of(boxes, index):
+def load_aabb(bounds, index):
     """Row ``index`` of an (n, 6) array as a tuple, which stays in registers."""
     return (
-        boxes[index, 0], boxes[index, 1], boxes[index, 2], boxes[index, 3], boxes[index, 4], boxes[index, 5]
+        bounds[index, 0], bounds[index, 1], bounds[index, 2], bounds[index, 3], bounds[index, 4], bounds[index, 5]
     )  # fmt: skip
 
 
@@ -52,8 +67,8 @@ def intervals_overlap(lower_a, upper_a, lower_b, upper_b, period):
 
 
 @kernel
-def boxes_overlap(a, b, period, wraps):
-    """The box test of every method.  ``period`` (3,) [m], 0 on axes that do not wrap; ``wraps``: any does."""
+def aabbs_overlap(a, b, period, wraps):
+    """The overlap test of every method.  ``period`` (3,) [m], 0 on axes that do not wrap; ``wraps``: any does."""
     if wraps:
         return (
             intervals_overlap(a[0], a[3], b[0], b[3], period[0])
@@ -64,24 +79,20 @@ def boxes_overlap(a, b, period, wraps):
 
 
 @kernel
-def any_wraps(period):
-    """Whether any axis is periodic."""
-    return period[0] > 0.0 or period[1] > 0.0 or period[2] > 0.0
-
-
-@kernel
-def append_overlaps(candidates, size, boxes, order, period, wraps, keys, found):
-    """Test the first ``size`` of ``candidates`` (2, BATCH), rows of ``boxes``; the new ``found`` after ``keys[found]``.
+def append_overlaps(candidates, size, stored, keys, found):
+    """Test the first ``size`` of ``candidates`` (2, BATCH), rows of ``stored``; how many keys there are then.
 
     Where ``keys`` has no room for all of them, overlaps are counted and not stored: the list is whole if the final
     ``found`` leaves room for a batch (``collect`` sees to it).  Unsigned indices spare the check for negative ones.
     """
+    bounds, order, period = stored
+    wraps = period[0] > 0.0 or period[1] > 0.0 or period[2] > 0.0
     fill = np.uint64(found)
     if found + size <= keys.size:
         for slot in range(np.uint64(size)):
             a = np.uint64(candidates[0, slot])
             b = np.uint64(candidates[1, slot])
-            hit = boxes_overlap(row_of(boxes, a), row_of(boxes, b), period, wraps)
+            hit = aabbs_overlap(load_aabb(bounds, a), load_aabb(bounds, b), period, wraps)
             number_a = np.int64(order[a])
             number_b = np.int64(order[b])
             keys[fill] = min(number_a, number_b) << 32 | max(number_a, number_b)  # overwritten unless it is a hit
@@ -90,12 +101,12 @@ def append_overlaps(candidates, size, boxes, order, period, wraps, keys, found):
         for slot in range(size):
             a = candidates[0, slot]
             b = candidates[1, slot]
-            fill += np.uint64(boxes_overlap(row_of(boxes, a), row_of(boxes, b), period, wraps))
+            fill += np.uint64(aabbs_overlap(load_aabb(bounds, a), load_aabb(bounds, b), period, wraps))
     return np.int64(fill)
 
 
 def collect(
-    search: Callable[[int, int, np.ndarray], tuple[int, int]], count: int, crew: ThreadTeam, expected: int
+    search: Callable[[int, int, np.ndarray], tuple[int, int]], count: int, team: ThreadTeam, expected: int
 ) -> tuple[list[np.ndarray], int]:
     """Run ``search(first, last, keys) -> (found, tested)`` over ``0 .. count``; the lists of keys and tests made.
 
@@ -114,5 +125,5 @@ def collect(
             found, tested = search(first, last, keys)
         return keys[:found], tested
 
-    results = crew.each(block, count, BLOCKS_PER_THREAD * crew.threads)
+    results = team.each(block, count, BLOCKS_PER_THREAD * team.threads)
     return [keys for keys, _ in results], sum(tested for _, tested in results)

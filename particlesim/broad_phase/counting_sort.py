@@ -1,4 +1,4 @@
-"""Counting sort by a digit: the first step of putting boxes in the order of the grid's cells or the octree's codes."""
+"""Counting sort by a digit: the first step of putting AABBs in the order of the grid's cells or the octree's codes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def _place(first, last, keys, order, shift, cursors, keys_out, order_out):
 
 
 def counting_sort(
-    keys: np.ndarray, order: np.ndarray, buckets: int, crew: ThreadTeam, *, shift: int
+    keys: np.ndarray, order: np.ndarray, buckets: int, team: ThreadTeam, *, shift: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Sort by the bucket ``key >> shift``, below ``buckets``, of which there are few; equal ones stay in order.
 
@@ -46,7 +46,7 @@ def counting_sort(
     (buckets + 1,) int32.  Each thread counts and places a range of its own, so the result is the same for any number
     of threads.
     """
-    counts = np.zeros((crew.threads, buckets), dtype=np.int32)
+    counts = np.zeros((team.threads, buckets), dtype=np.int32)
     starts = np.empty(buckets + 1, dtype=np.int32)
     keys_out, order_out = np.empty_like(keys), np.empty_like(order)
 
@@ -56,7 +56,7 @@ def counting_sort(
     def place(thread: int, first: int, last: int) -> None:
         _place(first, last, keys, order, shift, counts[thread], keys_out, order_out)
 
-    crew.each(count, len(keys))
+    team.each(count, len(keys))
     _scan(counts, starts)
-    crew.each(place, len(keys))
+    team.each(place, len(keys))
     return keys_out, order_out, starts

@@ -1,19 +1,17 @@
-"""The cells of a uniform grid: how many, how large, how far boxes in them can reach, and which share a bucket."""
+"""The cells of a uniform grid: how many, how large, how far AABBs in them can reach, and which share a bucket."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from particlesim.broad_phase.aabb_statistics import Survey, wrapped_centre
+from particlesim.broad_phase.aabb_statistics import wrapped_centre
 from particlesim.core.jit import kernel
 
-# Buckets for each box where the cells are chosen.  Cells as wide as the boxes are about 2.5 for each box at a fill of
-# 0.2.  Where the boxes are further apart there are more, and cells share buckets.
-PER_BOX = 3.0
+# Buckets for each AABB where the cells are chosen.  Cells as wide as the AABBs are about 2.5 for each at a fill of
+# 0.2.  Where the AABBs are further apart there are more, and cells share buckets.
+PER_AABB = 3.0
 
-# Boxes more than LARGE times the typical edge are searched for apart, if there are any: a size that all cells are
+# AABBs more than LARGE times the typical edge are searched for apart, if there are any: a size that all cells are
 # laid out for must not come from a few.  Then the limit is MARGIN times the typical edge.
 LARGE = 4.0
 MARGIN = 2.0
@@ -27,143 +25,154 @@ _MOST_ALONG = 2.0**26
 # Rounding of a position counted in cells, of which there are at most 2**26 along an axis.
 _CELL_SLACK = 1e-7
 
-
-class Layout(NamedTuple):
-    """Each (3,): cells, int64; lower corner [m]; cells per metre; reach [cells], int64; widths of boxes [m].
-
-    ``shape``, int64: the buckets that boxes are counted into.  Cells whose numbers differ by a multiple of it share
-    one.  ``wraps``, bool: the first bucket comes after the last one, as on periodic axes and where buckets are
-    shared.  ``limit`` [m] is a float: boxes with a longer edge are not in the cells.
-    """
-
-    cells: np.ndarray
-    shape: np.ndarray
-    wraps: np.ndarray
-    origin: np.ndarray
-    inverse: np.ndarray
-    reach: np.ndarray
-    width: np.ndarray  # of the widest box in the cells, rounding included
-    limit: float
+# The grid, axis by axis.  Cells whose numbers differ by a multiple of ``buckets`` share a bucket.
+GRID = np.dtype(
+    [
+        ("cells", "i8", (3,)),
+        ("buckets", "i8", (3,)),  # that AABBs are counted into
+        ("reach", "i8", (3,)),  # [cells] between the centres of AABBs that overlap
+        ("wraps", "i8", (3,)),  # whether the first bucket comes after the last: periodic axes, and shared buckets
+        ("period", "f8", (3,)),  # [m], 0 on axes that do not wrap
+        ("origin", "f8", (3,)),  # lower corner [m]
+        ("per_metre", "f8", (3,)),  # cells
+        ("width", "f8", (3,)),  # of the widest AABB in the cells, rounding included [m]
+        ("limit", "f8"),  # AABBs with a longer edge are not in the cells [m]
+    ],
+    align=True,
+)
 
 
 @kernel
-def _choose_cells(extent, width, cells):
-    """As narrow as the widest box allows."""
+def _choose_cells(extent, grid):
+    """As narrow as the widest AABB allows."""
     for axis in range(3):
-        # A millionth more: the box reaches the next cell, never the one after, whatever the rounding.
-        narrowest = max(width[axis] * 1.000001, extent[axis] / _MOST_ALONG)
-        cells[axis] = max(1, int(extent[axis] / narrowest)) if extent[axis] > 0.0 else 1
+        # A millionth more: the AABB reaches the next cell, never the one after, whatever the rounding.
+        narrowest = max(grid.width[axis] * 1.000001, extent[axis] / _MOST_ALONG)
+        grid.cells[axis] = max(1, int(extent[axis] / narrowest)) if extent[axis] > 0.0 else 1
 
 
 @kernel
-def _share_buckets(wanted, period, cells, shape):
+def _share_buckets(wanted, grid):
     """At most about ``wanted`` buckets, equally many along each axis that has so many cells."""
-    longest = max(cells[0], cells[1], cells[2])
-    while longest > 3 and min(cells[0], longest) * 1.0 * min(cells[1], longest) * min(cells[2], longest) > wanted:
+    x, y, z = grid.cells[0], grid.cells[1], grid.cells[2]
+    longest = max(x, y, z)
+    while longest > 3 and min(x, longest) * 1.0 * min(y, longest) * min(z, longest) > wanted:
         longest -= 1 + longest // 16
     for axis in range(3):
-        shape[axis] = min(cells[axis], max(longest, 3))
-        if period[axis] > 0.0:
-            cells[axis] -= cells[axis] % shape[axis]
+        grid.buckets[axis] = min(grid.cells[axis], max(longest, 3))
+        if grid.period[axis] > 0.0:
+            grid.cells[axis] -= grid.cells[axis] % grid.buckets[axis]
 
 
 @kernel
-def _settle(extent, width, period, cells, shape, inverse, reach, wraps):
+def _take_cells(given, extent, grid):
+    """``given`` cells along each axis, a bucket each, or fewer where that is too many."""
+    for axis in range(3):
+        grid.cells[axis] = given if extent[axis] > 0.0 else 1
+    while float(grid.cells[0]) * grid.cells[1] * grid.cells[2] > MOST_CELLS:
+        for axis in range(3):
+            grid.cells[axis] = (grid.cells[axis] + 1) // 2
+    for axis in range(3):
+        grid.buckets[axis] = grid.cells[axis]
+
+
+@kernel
+def _set_reach(extent, grid):
     """Cells per metre and the reach.  An axis that wraps, on which the reach would meet itself, gets one cell."""
     for axis in range(3):
-        wraps[axis] = period[axis] > 0.0 or shape[axis] < cells[axis]
-        inverse[axis] = cells[axis] / extent[axis] if cells[axis] > 1 else 0.0
-        reach[axis] = int(np.ceil(min(width[axis] * inverse[axis], 1e9) + _CELL_SLACK))
-        if wraps[axis] and 2 * reach[axis] + 1 > shape[axis]:
-            cells[axis] = 1
-            shape[axis] = 1
-            inverse[axis] = 0.0
-        reach[axis] = min(reach[axis], shape[axis] - 1)
+        cells = grid.cells[axis]
+        grid.wraps[axis] = int(grid.period[axis] > 0.0 or grid.buckets[axis] < cells)
+        grid.per_metre[axis] = cells / extent[axis] if cells > 1 else 0.0
+        reach = int(np.ceil(min(grid.width[axis] * grid.per_metre[axis], 1e9) + _CELL_SLACK))
+        if grid.wraps[axis] and 2 * reach + 1 > grid.buckets[axis]:
+            grid.cells[axis] = 1
+            grid.buckets[axis] = 1
+            grid.per_metre[axis] = 0.0
+        grid.reach[axis] = min(reach, grid.buckets[axis] - 1)
 
 
 @kernel
-def _lay_out(
-    region_lower, region_upper, widest, slack, period, limit, count, given,
-    cells, shape, wraps, inverse, reach, width,
-):  # fmt: skip
+def _lay_out(statistics, period, count, given, grids):
+    grid, known = grids[0], statistics[0]
+    grid.limit = MARGIN * known.typical if known.longest > LARGE * known.typical else known.longest
     extent = np.empty(3)
     for axis in range(3):
-        width[axis] = min(widest[axis], limit) * (1.0 + 1e-9) + slack[axis]
-        extent[axis] = region_upper[axis] - region_lower[axis]
-        if extent[axis] <= max(slack[axis], 1e-300):
+        slack = known.slack[axis]
+        grid.period[axis] = period[axis]
+        grid.origin[axis] = known.region_lower[axis]
+        grid.width[axis] = min(known.widest[axis], grid.limit) * (1.0 + 1e-9) + slack
+        extent[axis] = known.region_upper[axis] - known.region_lower[axis]
+        if extent[axis] <= max(slack, 1e-300):
             extent[axis] = 0.0
-        cells[axis] = given if extent[axis] > 0.0 else 1
     if given == 0:
-        _choose_cells(extent, width, cells)
-        _share_buckets(PER_BOX * count, period, cells, shape)
+        _choose_cells(extent, grid)
+        _share_buckets(PER_AABB * count, grid)
     else:
-        while float(cells[0]) * cells[1] * cells[2] > MOST_CELLS:
-            for axis in range(3):
-                cells[axis] = (cells[axis] + 1) // 2
-        shape[:] = cells
-    _settle(extent, width, period, cells, shape, inverse, reach, wraps)
+        _take_cells(given, extent, grid)
+    _set_reach(extent, grid)
 
 
-def lay_out(seen: Survey, period: np.ndarray, count: int, given: int) -> Layout:
-    """The grid for ``count`` boxes as seen by ``survey``; ``given`` cells along each axis, or 0: see ``grid_pairs``."""
-    widest = float(seen.widest.max())
-    limit = MARGIN * seen.typical if widest > LARGE * seen.typical else widest
-    cells, shape, reach = np.empty((3, 3), dtype=np.int64)
-    inverse, width = np.empty((2, 3))
-    wraps = np.empty(3, dtype=np.bool_)
-    _lay_out(
-        seen.region_lower, seen.region_upper, seen.widest, seen.slack, period, limit, count, given,
-        cells, shape, wraps, inverse, reach, width,
-    )  # fmt: skip
-    return Layout(cells, shape, wraps, seen.region_lower, inverse, reach, width, limit)
+def lay_out(statistics: np.ndarray, period: np.ndarray, count: int, given: int) -> np.ndarray:
+    """The grid, ``GRID`` (1,), for ``count`` AABBs; ``given`` cells along each axis, or 0: see ``grid_pairs``."""
+    grids = np.empty(1, dtype=GRID)
+    _lay_out(statistics, period, count, given, grids)
+    return grids
 
 
 @kernel
-def _cell_of(position, origin, inverse, cells):
+def _axis_of(grid, axis):
+    """What ``_bucket_of`` needs of an axis, as a tuple, which stays in registers."""
+    return grid.period[axis], grid.cells[axis], grid.buckets[axis], grid.origin[axis], grid.per_metre[axis]
+
+
+@kernel
+def _cell_of(position, origin, per_metre, cells):
     """Cell along an axis; what lies outside the region is in the cell at its edge."""
-    return np.uint64(min(max((position - origin) * inverse, 0.0), cells - 1.0))
+    return np.uint64(min(max((position - origin) * per_metre, 0.0), cells - 1.0))
 
 
 @kernel
-def _bucket_of(lower, upper, period, cells, shape, origin, inverse):
+def _bucket_of(lower, upper, along):
     """Bucket along an axis of an interval's centre."""
-    cell = _cell_of(wrapped_centre(lower, upper, period), origin, inverse, cells)
-    return cell % np.uint64(shape) if shape < cells else cell
+    period, cells, buckets, origin, per_metre = along
+    cell = _cell_of(wrapped_centre(lower, upper, period), origin, per_metre, cells)
+    return cell % np.uint64(buckets) if buckets < cells else cell
 
 
 @kernel
-def fill_keys(first, last, lower, upper, period, cells, shape, origin, inverse, limit, keys, order):
-    """``keys``: the bucket of each box's centre, x fastest, or one past the last for a box above the limit."""
-    period_x, period_y, period_z = period[0], period[1], period[2]
-    cells_x, cells_y, cells_z = cells[0], cells[1], cells[2]
-    shape_x, shape_y, shape_z = shape[0], shape[1], shape[2]
-    origin_x, origin_y, origin_z = origin[0], origin[1], origin[2]
-    inverse_x, inverse_y, inverse_z = inverse[0], inverse[1], inverse[2]
+def fill_keys(first, last, aabbs, grids, keys, order):
+    """``keys``: the bucket of each AABB's centre, x fastest, or one past the last for an AABB above the limit."""
+    lower, upper, _ = aabbs
+    grid = grids[0]
+    along_x, along_y, along_z = _axis_of(grid, 0), _axis_of(grid, 1), _axis_of(grid, 2)
+    buckets_x, buckets_y, buckets_z = along_x[2], along_y[2], along_z[2]
+    limit = grid.limit
     for index in range(first, last):
         a, b, c = lower[index, 0], lower[index, 1], lower[index, 2]
         d, e, f = upper[index, 0], upper[index, 1], upper[index, 2]
-        x = _bucket_of(a, d, period_x, cells_x, shape_x, origin_x, inverse_x)
-        y = _bucket_of(b, e, period_y, cells_y, shape_y, origin_y, inverse_y)
-        z = _bucket_of(c, f, period_z, cells_z, shape_z, origin_z, inverse_z)
-        key = (z * np.uint64(shape_y) + y) * np.uint64(shape_x) + x
+        x = _bucket_of(a, d, along_x)
+        y = _bucket_of(b, e, along_y)
+        z = _bucket_of(c, f, along_z)
+        key = (z * np.uint64(buckets_y) + y) * np.uint64(buckets_x) + x
         large = max(d - a, e - b, f - c) > limit
-        keys[index] = np.uint64(shape_x * shape_y * shape_z) if large else key
+        keys[index] = np.uint64(buckets_x * buckets_y * buckets_z) if large else key
         order[index] = index
 
 
 @kernel
-def buckets_of_box(box, axis, period, cells, shape, origin, inverse, width):
-    """First bucket along an axis, and how many from there on, in which centres of boxes that meet ``box`` may lie."""
-    centre = wrapped_centre(box[axis], box[axis + 3], period[axis])
-    half = 0.5 * (box[axis + 3] - box[axis] + width[axis])
-    if period[axis] > 0.0:
-        low = np.floor((centre - half) * inverse[axis] - _CELL_SLACK)
-        number = np.floor((centre + half) * inverse[axis] + _CELL_SLACK) - low + 1.0
-        if number >= shape[axis] or shape[axis] == 1:
-            return 0, shape[axis]
-        return int(low) % shape[axis], int(number)
-    first = np.int64(_cell_of(centre - half, origin[axis], inverse[axis], cells[axis]))
-    last = np.int64(_cell_of(centre + half, origin[axis], inverse[axis], cells[axis]))
-    if last - first + 1 >= shape[axis]:
-        return 0, shape[axis]
-    return first % shape[axis], last - first + 1
+def buckets_of_aabb(aabb, axis, grid):
+    """First bucket along an axis, and how many from there on, with centres of all AABBs that may overlap ``aabb``."""
+    period, cells, buckets, origin, per_metre = _axis_of(grid, axis)
+    centre = wrapped_centre(aabb[axis], aabb[axis + 3], period)
+    half = 0.5 * (aabb[axis + 3] - aabb[axis] + grid.width[axis])
+    if period > 0.0:
+        low = np.floor((centre - half) * per_metre - _CELL_SLACK)
+        number = np.floor((centre + half) * per_metre + _CELL_SLACK) - low + 1.0
+        if number >= buckets or buckets == 1:
+            return 0, buckets
+        return int(low) % buckets, int(number)
+    first = np.int64(_cell_of(centre - half, origin, per_metre, cells))
+    last = np.int64(_cell_of(centre + half, origin, per_metre, cells))
+    if last - first + 1 >= buckets:
+        return 0, buckets
+    return first % buckets, last - first + 1

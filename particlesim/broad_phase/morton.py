@@ -1,7 +1,7 @@
-"""Where a box belongs in the octree, as one number: its size class, then its octant level by level.
+"""Where an AABB belongs in the octree, as one number: its size class, then its octant level by level.
 
 The octants are interleaved bits of the centre's coordinates: the code of G. M. Morton, "A Computer Oriented Geodetic
-Data Base and a New Technique in File Sequencing", IBM, 1966.  Sorted by code, the boxes of every node of the tree
+Data Base and a New Technique in File Sequencing", IBM, 1966.  Sorted by code, the AABBs of every node of the tree
 are one range.
 """
 
@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from particlesim.broad_phase.aabb_statistics import Survey, wrapped_centre
+from particlesim.broad_phase.aabb_statistics import wrapped_centre
+from particlesim.broad_phase.aabb_test import Aabbs
 from particlesim.core.jit import kernel
+from particlesim.core.math3d import to_vec3
 from particlesim.core.parallel import ThreadTeam
 
 # Levels of octants in a code, three bits each; three bits for the size class stand above them.
@@ -18,8 +20,8 @@ LEVELS = 20
 CLASS_SHIFT = 3 * LEVELS
 CODE_BITS = CLASS_SHIFT + 3
 
-# Classes of boxes by their longest edge: the largest and those down to a quarter of it, down to a sixteenth, ...
-# A large box among small ones would stretch its leaf over many others; in a tree of its own size it does not.
+# Classes of AABBs by their longest edge: the largest and those down to a quarter of it, down to a sixteenth, ...
+# A large one among small ones would stretch its leaf over many others; in a tree of its own size it does not.
 CLASS_RATIO = 4.0
 _LAST_CLASS = 7
 
@@ -47,7 +49,7 @@ def octants(x, y, z):
 
 @kernel
 def _size_class(width, widest):
-    """0 for the largest boxes, 7 for all that are at most 4**-7 of the widest."""
+    """0 for the largest AABBs, 7 for all that are at most 4**-7 of the widest."""
     found = 0
     bound = widest / CLASS_RATIO
     for _ in range(_LAST_CLASS):
@@ -57,37 +59,33 @@ def _size_class(width, widest):
 
 
 @kernel
-def _fill_codes(first, last, lower, upper, period, origin, inverse, widest, codes):
-    """Codes of boxes ``first .. last`` in a root cube at ``origin`` (3,) [m] of edge 1 / ``inverse`` [m]."""
-    period_x, period_y, period_z = period[0], period[1], period[2]
-    origin_x, origin_y, origin_z = origin[0], origin[1], origin[2]
+def _fill_codes(first, last, aabbs, statistics, codes):
+    """Codes of AABBs ``first .. last`` in the root cube, which is as wide as the region of most centres."""
+    lower, upper, period = aabbs
+    scale, longest = statistics[0].scale, statistics[0].longest
+    period_x, period_y, period_z = to_vec3(period)
+    origin_x, origin_y, origin_z = to_vec3(statistics[0].region_lower)
     for index in range(first, last):
         a, b, c = lower[index, 0], lower[index, 1], lower[index, 2]
         d, e, f = upper[index, 0], upper[index, 1], upper[index, 2]
         code = octants(
-            (wrapped_centre(a, d, period_x) - origin_x) * inverse,
-            (wrapped_centre(b, e, period_y) - origin_y) * inverse,
-            (wrapped_centre(c, f, period_z) - origin_z) * inverse,
+            (wrapped_centre(a, d, period_x) - origin_x) * scale,
+            (wrapped_centre(b, e, period_y) - origin_y) * scale,
+            (wrapped_centre(c, f, period_z) - origin_z) * scale,
         )
-        codes[index] = _size_class(max(d - a, e - b, f - c), widest) << CLASS_SHIFT | code
+        codes[index] = _size_class(max(d - a, e - b, f - c), longest) << CLASS_SHIFT | code
 
 
-def codes_of(
-    lower: np.ndarray, upper: np.ndarray, period: np.ndarray, seen: Survey, inverse: float, crew: ThreadTeam
-) -> np.ndarray:
-    """Codes (n,) int64 of all boxes in the cube of edge 1 / ``inverse`` [m] about the region of most centres."""
-    codes = np.empty(len(lower), dtype=np.int64)
-    origin, widest = seen.region_lower, float(seen.widest.max())
-    crew.each(
-        lambda _, first, last: _fill_codes(first, last, lower, upper, period, origin, inverse, widest, codes),
-        len(lower),
-    )
+def codes_of(aabbs: Aabbs, statistics: np.ndarray, team: ThreadTeam) -> np.ndarray:
+    """Codes (n,) int64 of all AABBs, with their ``aabb_statistics``."""
+    codes = np.empty(len(aabbs.lower), dtype=np.int64)
+    team.each(lambda _, first, last: _fill_codes(first, last, aabbs, statistics, codes), len(codes))
     return codes
 
 
 @kernel
 def fill_octants(points, lower, inverse, codes):
-    """Codes of ``points`` (n, 3) in a box at ``lower`` (3,) of edges 1 / ``inverse`` (3,)."""
+    """Codes of ``points`` (n, 3) in a cuboid at ``lower`` (3,) of edges 1 / ``inverse`` (3,)."""
     for index in range(points.shape[0]):
         codes[index] = octants(
             (points[index, 0] - lower[0]) * inverse[0],

@@ -1,21 +1,28 @@
-"""The octree: boxes sorted by code as far as it takes, the nodes over them, and the bounds of the boxes in each."""
+"""The octree: AABBs sorted by code as far as it takes, the nodes over them, and the bounds of the AABBs in each."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from particlesim.broad_phase.aabb_statistics import Survey, wrapped_centre
+from particlesim.broad_phase.aabb_statistics import wrapped_centre
+from particlesim.broad_phase.aabb_test import Aabbs, StoredAabbs
 from particlesim.broad_phase.counting_sort import counting_sort
 from particlesim.broad_phase.morton import CLASS_SHIFT, CODE_BITS, LEVELS
 from particlesim.broad_phase.soa_aabb import LANES
 from particlesim.core.jit import kernel
 from particlesim.core.parallel import ALONE, ThreadTeam
 
-# Columns of ``nodes`` (k, 4) int32: the range of boxes, the first child (the others follow it), how many; a leaf
-# has none.  Node 0 is the root; children stand after their parents.
-START, STOP, CHILD, CHILDREN = 0, 1, 2, 3
+# A node of the octree.  Node 0 is the root; children stand after their parents.
+NODE = np.dtype(
+    [
+        ("start", "i4"),  # range of AABBs
+        ("stop", "i4"),
+        ("child", "i4"),  # the first; the others follow it
+        ("children", "i4"),  # how many; a leaf has none
+    ]
+)
 
-# Levels that many boxes are sorted by first, all threads together, and the size classes with them: 2**12 ranges,
+# Levels that many AABBs are sorted by first, all threads together, and the size classes with them: 2**12 ranges,
 # which are then sorted further one by one.
 _TOP_LEVELS = 3
 
@@ -27,8 +34,13 @@ _STACK = (2 + LEVELS) * 512
 
 
 @kernel
-def _sort_range(start, stop, shift, bits, codes, order, spare_codes, spare_order, ends):
-    """Sort ``start .. stop`` by the ``bits`` above ``shift``; ``ends`` (2**bits,): where each bucket ends."""
+def _sort_range(start, stop, shift, bits, coded, spare, ends):
+    """Sort ``start .. stop`` of ``coded`` by the ``bits`` above ``shift``; ``ends`` (2**bits,): where each bucket ends.
+
+    ``coded`` and ``spare`` are codes and numbers of AABBs, (codes, order).
+    """
+    codes, order = coded
+    spare_codes, spare_order = spare
     mask = (1 << bits) - 1
     ends[: mask + 1] = 0
     for slot in range(start, stop):
@@ -50,11 +62,13 @@ def _sort_range(start, stop, shift, bits, codes, order, spare_codes, spare_order
 
 
 @kernel
-def _sort_deeper(first, last, shift, lowest, max_count, starts, codes, order, spare_codes, spare_order):
+def _sort_deeper(first, last, starts, limits, coded, spare):
     """Sort ranges ``first .. last`` of ``starts``, equal above ``shift``, until they are short or equal to ``lowest``.
 
-    Ranges that hold at most ``max_count`` boxes stay as they are: they will not be split.
+    ``limits``: (shift, lowest, max_count).  Ranges that hold at most ``max_count`` AABBs stay as they are: they will
+    not be split.
     """
+    shift, lowest, max_count = limits
     stack = np.empty((_STACK, 3), dtype=np.int64)
     ends = np.empty(1 << 3 * _LEVELS_AT_ONCE, dtype=np.int64)
     for number in range(first, last):
@@ -71,7 +85,7 @@ def _sort_deeper(first, last, shift, lowest, max_count, starts, codes, order, sp
                 bits = 3
                 while bits < 3 * _LEVELS_AT_ONCE and (max_count << bits) < stop - start and bits + 3 <= above - lowest:
                     bits += 3
-                _sort_range(start, stop, above - bits, bits, codes, order, spare_codes, spare_order, ends)
+                _sort_range(start, stop, above - bits, bits, coded, spare, ends)
                 for bucket in range(1 << bits):
                     if ends[bucket] - start > max_count:
                         stack[size, 0] = start
@@ -82,27 +96,27 @@ def _sort_deeper(first, last, shift, lowest, max_count, starts, codes, order, sp
 
 
 def sort_by_code(
-    codes: np.ndarray, order: np.ndarray, max_count: int, max_depth: int, crew: ThreadTeam
+    codes: np.ndarray, order: np.ndarray, max_count: int, max_depth: int, team: ThreadTeam
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Sort ``codes`` (n,) int64 with ``order`` (n,) int32, as far as nodes of ``max_count`` boxes need it.
+    """Sort ``codes`` (n,) int64 with ``order`` (n,) int32, as far as nodes of ``max_count`` AABBs need it.
 
-    Boxes are in the order of the octants of all nodes that hold more; in nodes that hold fewer they are as they were.
+    AABBs are in the order of the octants of all nodes that hold more; in nodes that hold fewer they are as they were.
     """
     count = len(codes)
-    lowest = 3 * (LEVELS - max_depth)
     shift = CODE_BITS
     starts = np.array([0, count], dtype=np.int32)
     if count >= ALONE and max_depth > _TOP_LEVELS:
         shift = CLASS_SHIFT - 3 * _TOP_LEVELS
-        spare_codes, spare_order = codes, order
-        codes, order, starts = counting_sort(codes, order, 1 << (CODE_BITS - shift), crew, shift=shift)
+        spare = codes, order
+        codes, order, starts = counting_sort(codes, order, 1 << (CODE_BITS - shift), team, shift=shift)
     else:
-        spare_codes, spare_order = np.empty_like(codes), np.empty_like(order)
-
-    def deeper(_: int, first: int, last: int) -> None:
-        _sort_deeper(first, last, shift, lowest, max_count, starts, codes, order, spare_codes, spare_order)
-
-    crew.each(deeper, len(starts) - 1, 32 * crew.threads)
+        spare = np.empty_like(codes), np.empty_like(order)
+    coded, limits = (codes, order), (shift, 3 * (LEVELS - max_depth), max_count)
+    team.each(
+        lambda _, first, last: _sort_deeper(first, last, starts, limits, coded, spare),
+        len(starts) - 1,
+        32 * team.threads,
+    )
     return codes, order
 
 
@@ -137,19 +151,21 @@ def _end_of_digit(codes, start, stop, shift):
 
 
 @kernel
-def _build(codes, max_count, max_depth, nodes):
-    nodes[0, START] = 0
-    nodes[0, STOP] = codes.size
+def _build(codes, max_count, max_depth, nodes, leaves):
+    """Write nodes and leaves; how many of each."""
+    nodes[0].start = 0
+    nodes[0].stop = codes.size
     size = 1
     node = 0
+    found = 0
     while node < size:
-        start = nodes[node, START]
-        stop = nodes[node, STOP]
-        nodes[node, CHILDREN] = 0
+        start = nodes[node].start
+        stop = nodes[node].stop
+        nodes[node].children = 0
         if stop - start > max_count:
             shift = _split_shift(codes[start], codes[stop - 1], max_depth)
             if shift >= 0:
-                nodes[node, CHILD] = size
+                nodes[node].child = size
                 while start < stop:
                     # Octants that hold few together are one leaf: half of the node, or a quarter, or an eighth.
                     bits = 0 if shift == CLASS_SHIFT else 2
@@ -157,101 +173,101 @@ def _build(codes, max_count, max_depth, nodes):
                     while bits > 0 and end - start > max_count:
                         bits -= 1
                         end = _end_of_digit(codes, start, end, shift + bits)
-                    nodes[size, START] = start
-                    nodes[size, STOP] = end
+                    nodes[size].start = start
+                    nodes[size].stop = end
                     size += 1
                     start = end
-                nodes[node, CHILDREN] = size - nodes[node, CHILD]
+                nodes[node].children = size - nodes[node].child
+        if nodes[node].children == 0:
+            leaves[found] = node
+            found += 1
         node += 1
-    return size
+    return size, found
 
 
-def build(codes: np.ndarray, max_count: int, max_depth: int) -> np.ndarray:
-    """Nodes (k, 4) int32 over sorted ``codes`` (n,) int64, n > 0: split while they hold more than ``max_count``.
+def build(codes: np.ndarray, max_count: int, max_depth: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (k,) ``NODE`` over sorted ``codes`` (n,) int64, n > 0, and the numbers (l,) int32 of those that are leaves.
 
-    Depth is counted in octants; ``max_depth`` ends the splitting of particles that coincide.
+    Nodes are split while they hold more than ``max_count`` AABBs.  Depth is counted in octants;
+    ``max_depth`` ends the splitting of particles that coincide.
     """
-    # Every inner node has two children or more, so there are fewer than twice as many nodes as boxes.
-    nodes = np.empty((2 * len(codes), 4), dtype=np.int32)
-    return nodes[: _build(codes, max_count, max_depth, nodes)]
+    # Every inner node has two children or more, so there are fewer than twice as many nodes as AABBs.
+    nodes, leaves = np.empty(2 * len(codes), dtype=NODE), np.empty(len(codes), dtype=np.int32)
+    size, found = _build(codes, max_count, max_depth, nodes, leaves)
+    return nodes[:size], leaves[:found]
 
 
 @kernel
-def _fill_in_order(first, last, lower, upper, order, period, origin, scale, boxes, columns):
+def _fill_in_order(first, last, aabbs, statistics, stored, soa):
+    lower, upper, period = aabbs
+    bounds, order, _ = stored
+    scale = statistics[0].scale
+    origin = statistics[0].region_lower
     for place in range(first, last):
         index = np.uint64(order[place])
         for axis in range(3):
             a = lower[index, axis]
             b = upper[index, axis]
-            boxes[place, axis] = a
-            boxes[place, axis + 3] = b
+            bounds[place, axis] = a
+            bounds[place, axis + 3] = b
             if period[axis] > 0.0:
                 shift = wrapped_centre(a, b, period[axis]) - 0.5 * (a + b)
                 a += shift
                 b += shift
-            columns[axis, place] = (a - origin[axis]) * scale
-            columns[axis + 3, place] = (b - origin[axis]) * scale
+            soa[axis, place] = (a - origin[axis]) * scale
+            soa[axis + 3, place] = (b - origin[axis]) * scale
 
 
 def in_order(
-    lower: np.ndarray,
-    upper: np.ndarray,
-    order: np.ndarray,
-    period: np.ndarray,
-    seen: Survey,
-    scale: float,
-    crew: ThreadTeam,
-) -> tuple[np.ndarray, np.ndarray]:
-    """The boxes that ``order`` (n,) names: rows (n, 6) float64 [m], and columns (6, n + LANES) float32.
+    aabbs: Aabbs, order: np.ndarray, statistics: np.ndarray, team: ThreadTeam
+) -> tuple[StoredAabbs, np.ndarray]:
+    """The AABBs that ``order`` (n,) names, and the same as ``soa`` (6, n + LANES) float32.
 
-    Columns are about the corner of the region and times ``scale``; on a periodic axis they hold the image whose
-    centre is in the primary cell.
+    ``soa`` is in the unit cube that stands for the root cube; on a periodic axis it holds the image whose centre is in
+    the primary cell.
     """
     count = len(order)
-    boxes, columns = np.empty((count, 6)), np.zeros((6, count + LANES), dtype=np.float32)
-    origin = seen.region_lower
-    crew.each(
-        lambda _, first, last: _fill_in_order(first, last, lower, upper, order, period, origin, scale, boxes, columns),
-        count,
-    )
-    return boxes, columns
+    stored = StoredAabbs(np.empty((count, 6)), order, aabbs.period)
+    soa = np.zeros((6, count + LANES), dtype=np.float32)
+    team.each(lambda _, first, last: _fill_in_order(first, last, aabbs, statistics, stored, soa), count)
+    return stored, soa
 
 
 @kernel
-def _fit_leaves(first, last, nodes, columns, bounds):
+def _fit_leaves(first, last, nodes, soa, node_soa):
     for node in range(first, last):
-        if nodes[node, CHILDREN] == 0:
-            start = np.uint64(nodes[node, START])
-            stop = np.uint64(nodes[node, STOP])
+        if nodes[node].children == 0:
+            start = np.uint64(nodes[node].start)
+            stop = np.uint64(nodes[node].stop)
             for axis in range(3):
-                low = columns[axis, start]
-                high = columns[axis + 3, start]
+                low = soa[axis, start]
+                high = soa[axis + 3, start]
                 for place in range(start + np.uint64(1), stop):
-                    low = min(low, columns[axis, place])
-                    high = max(high, columns[axis + 3, place])
-                bounds[axis, node] = low
-                bounds[axis + 3, node] = high
+                    low = min(low, soa[axis, place])
+                    high = max(high, soa[axis + 3, place])
+                node_soa[axis, node] = low
+                node_soa[axis + 3, node] = high
 
 
 @kernel
-def _fit_parents(nodes, bounds):
+def _fit_parents(nodes, node_soa):
     """From the last node to the root: children stand after their parents."""
     for node in range(nodes.shape[0] - 1, -1, -1):
-        child = nodes[node, CHILD]
-        if nodes[node, CHILDREN] > 0:
+        child = nodes[node].child
+        if nodes[node].children > 0:
             for axis in range(3):
-                low = bounds[axis, child]
-                high = bounds[axis + 3, child]
-                for near in range(child + 1, child + nodes[node, CHILDREN]):
-                    low = min(low, bounds[axis, near])
-                    high = max(high, bounds[axis + 3, near])
-                bounds[axis, node] = low
-                bounds[axis + 3, node] = high
+                low = node_soa[axis, child]
+                high = node_soa[axis + 3, child]
+                for near in range(child + 1, child + nodes[node].children):
+                    low = min(low, node_soa[axis, near])
+                    high = max(high, node_soa[axis + 3, near])
+                node_soa[axis, node] = low
+                node_soa[axis + 3, node] = high
 
 
-def fit(nodes: np.ndarray, columns: np.ndarray, crew: ThreadTeam) -> np.ndarray:
-    """Bounds (6, k + LANES) float32 of the columns in each node."""
-    bounds = np.zeros((6, len(nodes) + LANES), dtype=np.float32)
-    crew.each(lambda _, first, last: _fit_leaves(first, last, nodes, columns, bounds), len(nodes), 4 * crew.threads)
-    _fit_parents(nodes, bounds)
-    return bounds
+def fit(nodes: np.ndarray, soa: np.ndarray, team: ThreadTeam) -> np.ndarray:
+    """Bounds (6, k + LANES) float32 of the AABBs in each node."""
+    node_soa = np.zeros((6, len(nodes) + LANES), dtype=np.float32)
+    team.each(lambda _, first, last: _fit_leaves(first, last, nodes, soa, node_soa), len(nodes), 4 * team.threads)
+    _fit_parents(nodes, node_soa)
+    return node_soa

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from particlesim.broad_phase.morton import LEVELS, fill_octants
 from particlesim.core.jit import kernel
@@ -47,19 +48,37 @@ def _fill_leaves(codes, max_count, max_depth, leaves):
 
 
 def octree_leaves(
-    lower: np.ndarray,
-    upper: np.ndarray,
+    lower: ArrayLike,
+    upper: ArrayLike,
     max_count: int,
     max_depth: int,
-    world_lower: np.ndarray,
-    world_upper: np.ndarray,
+    world_lower: ArrayLike,
+    world_upper: ArrayLike,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Leaf cells of the octree of the box centres, empty ones too: together they fill the world.  For drawing.
+    """Leaf cells of the octree of the AABB centres, empty ones too: together they fill the world.  For drawing.
 
-    ``lower``, ``upper`` (n, 3) float64 [m] as for ``find_pairs``; ``world_lower``, ``world_upper`` (3,) [m].  A cell
-    is split into eight while it holds more than ``max_count`` centres and is less than ``max_depth`` (1 .. 20) deep;
-    a centre outside the world counts as in the cell nearest to it.  Returns the cells' lower and upper corners (k, 3)
-    float64 [m] and depths (k,) int64, 0 for the world itself.  Source: S. Goodwin, section III.
+    Source: S. Goodwin, section III.
+
+    Parameters
+    ----------
+    lower, upper : array_like (n, 3)
+        Corners of the AABBs [m], as for ``find_pairs``.  A centre outside the world counts as in the cell nearest to
+        it.
+    max_count, max_depth : int
+        A cell is split into eight while it holds more than ``max_count`` centres and is less than ``max_depth``
+        (1 .. 20) deep.
+    world_lower, world_upper : array_like (3,)
+        Corners of the world [m].
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        Lower and upper corners (k, 3) float64 [m] of the cells, and their depths (k,) int64, 0 for the world itself.
+
+    Raises
+    ------
+    ValueError
+        For ``max_count`` or ``max_depth`` out of range, and a world without a volume.
     """
     edges = np.asarray(world_upper, dtype=np.float64) - np.asarray(world_lower, dtype=np.float64)
     if max_count < 1 or not 1 <= max_depth <= LEVELS or not (edges > 0.0).all():
@@ -67,9 +86,10 @@ def octree_leaves(
             f"octree_leaves: need max_count >= 1, max_depth in 1 .. {LEVELS} and a world with a volume, "
             f"got {max_count}, {max_depth} and edges {edges}"
         )
+    centre = 0.5 * (np.asarray(lower, dtype=np.float64) + np.asarray(upper, dtype=np.float64))
     corner = np.array(world_lower, dtype=np.float64)
-    codes = np.empty(len(lower), dtype=np.int64)
-    fill_octants(0.5 * (lower + upper), corner, 1.0 / edges, codes)
+    codes = np.empty(len(centre), dtype=np.int64)
+    fill_octants(centre, corner, 1.0 / edges, codes)
     codes.sort()
     leaves = np.empty((64, 4), dtype=np.int64)
     found = _fill_leaves(codes, max_count, max_depth, leaves)

@@ -108,7 +108,7 @@ def _write_band(keys, first_row, rows, unique, pairs):
     return _compact(pairs) if unique else keys.size
 
 
-def _banded(lists: list[np.ndarray], bands: int, band: int, crew: ThreadTeam) -> tuple[np.ndarray, np.ndarray]:
+def _banded(lists: list[np.ndarray], bands: int, band: int, team: ThreadTeam) -> tuple[np.ndarray, np.ndarray]:
     """All keys in the order of their bands, and where each band starts (bands + 1,) int64."""
     counts = np.zeros((len(lists), bands), dtype=np.int64)
     shift = band + 32
@@ -117,7 +117,7 @@ def _banded(lists: list[np.ndarray], bands: int, band: int, crew: ThreadTeam) ->
         for number in range(first, last):
             _count_bands(lists[number], shift, counts[number])
 
-    crew.each(count, len(lists))
+    team.each(count, len(lists))
     ends = counts.T.cumsum().reshape(bands, -1).T  # by band, and in a band by list
     cursors = np.ascontiguousarray(ends - counts)
     keys = np.empty(int(counts.sum()), dtype=np.int64)
@@ -126,12 +126,12 @@ def _banded(lists: list[np.ndarray], bands: int, band: int, crew: ThreadTeam) ->
         for number in range(first, last):
             _fill_bands(lists[number], shift, cursors[number], keys)
 
-    crew.each(fill, len(lists))
+    team.each(fill, len(lists))
     return keys, np.append(0, ends[-1])
 
 
-def canonical(lists: list[np.ndarray], count: int, crew: ThreadTeam, *, unique: bool = False) -> np.ndarray:
-    """All keys of ``lists`` as (m, 2) int64 pairs sorted by (i, j), among ``count`` boxes; uses up the lists.
+def sort_pairs(lists: list[np.ndarray], count: int, team: ThreadTeam, *, unique: bool = False) -> np.ndarray:
+    """All keys of ``lists`` as (m, 2) int64 pairs sorted by (i, j), among ``count`` AABBs; uses up the lists.
 
     ``unique``: the lists may hold a pair more than once; it comes out once.
     """
@@ -142,7 +142,7 @@ def canonical(lists: list[np.ndarray], count: int, crew: ThreadTeam, *, unique: 
         pairs = np.empty((lists[0].size, 2), dtype=np.int64)
         return pairs[: int(_write_band(lists[0], 0, count, unique, pairs))]
     bands = ((count - 1) >> band) + 1
-    keys, starts = _banded(lists, bands, band, crew)
+    keys, starts = _banded(lists, bands, band, team)
     lists.clear()  # as much memory as the keys take
     pairs = np.empty((len(keys), 2), dtype=np.int64)
     sizes = np.empty(bands, dtype=np.int64)
@@ -153,7 +153,7 @@ def canonical(lists: list[np.ndarray], count: int, crew: ThreadTeam, *, unique: 
             rows = min(1 << band, count - (number << band))
             sizes[number] = _write_band(keys[here], number << band, rows, unique, pairs[here])
 
-    crew.each(write, bands, 8 * crew.threads)
+    team.each(write, bands, 8 * team.threads)
     if sizes.sum() == len(keys):
         return pairs
     return np.concatenate([pairs[int(s) : int(s + size)] for s, size in zip(starts[:-1], sizes, strict=True)])

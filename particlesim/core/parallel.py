@@ -5,13 +5,18 @@ take one range; many take one range a thread, or more for work that is uneven, f
 kernel serves both, so it is compiled once, without the seconds and the 0.1 ms a call that numba's own ``parallel=True``
 costs, and a call with a few hundred items pays for no threads.  A kernel writes only to the items of its range, or
 returns a list of its own, so that results do not depend on the number of threads.
+
+How many threads a team has is said, first to last: by its own argument; by ``limit_threads`` around the code that
+makes it, which holds for that code alone; by ``use_threads`` for the whole process; else one a processor.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TypeVar
 
 Result = TypeVar("Result")
@@ -19,23 +24,52 @@ Result = TypeVar("Result")
 # Fewer items than this are done by the calling thread: to wake threads and wait for them takes about 0.05 ms.
 ALONE = 4096
 
+# Threads of a team: None for one a processor that this process may use.
+_process_limit: int | None = None
+_limit: ContextVar[int | None] = ContextVar("threads", default=None)
 
-# How many threads a crew has; None for one a processor that this process may use.
-_threads: int | None = None
+
+def check_threads(count: int | None) -> int | None:
+    """``count`` itself. ValueError if it is below 1."""
+    if count is not None and count < 1:
+        raise ValueError(f"the number of threads must be at least 1, not {count}")
+    return count
 
 
 def use_threads(count: int | None) -> None:
-    """Let crews made from now on have ``count`` threads, or one a processor. ValueError if it is below 1."""
-    global _threads  # noqa: PLW0603  (a setting of the process, as the number of its processors is)
-    if count is not None and count < 1:
-        raise ValueError(f"the number of threads must be at least 1, not {count}")
-    _threads = count
+    """Let all teams of this process have ``count`` threads, or one a processor. ValueError if it is below 1."""
+    global _process_limit  # noqa: PLW0603  (a setting of the process, as the number of its processors is)
+    _process_limit = check_threads(count)
+
+
+@contextmanager
+def limit_threads(count: int | None) -> Iterator[None]:
+    """Let teams that the code inside makes have ``count`` threads; None leaves things as they are.
+
+    It concerns the thread that runs this code and nothing else: two simulations in one process, in turn or at the same
+    time, each keep their own number.
+
+    Parameters
+    ----------
+    count : int or None
+        Threads of a team, at least 1.
+
+    Raises
+    ------
+    ValueError
+        If ``count`` is below 1.
+    """
+    token = _limit.set(check_threads(count) or _limit.get())
+    try:
+        yield
+    finally:
+        _limit.reset(token)
 
 
 def available_threads() -> int:
-    """How many threads a crew for much work has."""
+    """How many threads a team for much work has here."""
     affinity = getattr(os, "sched_getaffinity", None)  # not every system can tell
-    return _threads or (len(affinity(0)) if affinity else os.cpu_count() or 1)
+    return _limit.get() or _process_limit or (len(affinity(0)) if affinity else os.cpu_count() or 1)
 
 
 # The pool of each number of threads, kept: to start threads for each task takes longer than many a task.
@@ -55,11 +89,25 @@ def _pool_of(threads: int) -> ThreadPoolExecutor | None:
 
 
 class ThreadTeam:
-    """The threads (see ``use_threads``) for one task over ``count`` items."""
+    """The threads for one task over ``count`` items.
 
-    def __init__(self, count: int) -> None:
+    Parameters
+    ----------
+    count : int
+        Items of the task.  Fewer than ``ALONE`` are done by the calling thread.
+    threads : int, optional
+        Threads for many items; by default what ``available_threads`` says.
+
+    Raises
+    ------
+    ValueError
+        If ``threads`` is below 1.
+    """
+
+    def __init__(self, count: int, threads: int | None = None) -> None:
         self._few = count < ALONE
-        self.threads = 1 if self._few else available_threads()
+        wanted = check_threads(threads) or available_threads()
+        self.threads = 1 if self._few else wanted
         self._pool = _pool_of(self.threads)
 
     def each(self, work: Callable[[int, int, int], Result], count: int, blocks: int = 0) -> list[Result]:

@@ -15,18 +15,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.broad_phase.aabb_statistics import survey
-from particlesim.broad_phase.morton import LEVELS, codes_of
-from particlesim.broad_phase.octree_build import sort_by_code
+from particlesim.broad_phase.spatial_order import spatial_order
 from particlesim.core.constants import VERLET_SKIN
 from particlesim.core.jit import kernel
 from particlesim.core.math3d import load_vec3, norm
 from particlesim.core.parallel import ThreadTeam
 
 FindPairs = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, int]]
-
-# Particles that lie together are put in the order of the curve only roughly: as many fit the fastest cache.
-_TOGETHER = 16
 
 
 class Places(NamedTuple):
@@ -57,15 +52,9 @@ class Neighbours(NamedTuple):
 
 
 def places_of(position: np.ndarray, period: np.ndarray) -> Places:
-    """Places along the curve of octants (see broad_phase/codes.py) for particles at ``position`` (n, 3)."""
+    """Places along a space-filling curve for particles at ``position`` (n, 3)."""
     count = len(position)
-    particle = np.arange(count, dtype=np.int32)
-    if count:
-        crew = ThreadTeam(count)
-        seen = survey(position, position, period, crew)
-        edge = float((seen.region_upper - seen.region_lower).max())
-        codes = codes_of(position, position, period, seen, 1.0 / edge if edge > 1e-300 else 0.0, crew)
-        _, particle = sort_by_code(codes, particle, _TOGETHER, LEVELS, crew)
+    particle = spatial_order(position, period)
     place = np.empty(count, dtype=np.int32)
     place[particle] = np.arange(count, dtype=np.int32)
     return Places(particle, place)
