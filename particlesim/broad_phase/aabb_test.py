@@ -18,8 +18,10 @@ from particlesim.core.parallel import ThreadTeam
 # Candidates that are decided at a time: two lists of as many uint32, which stay in the fastest cache.
 BATCH = 2048
 
-# Blocks a search is cut into for each thread: the work in a block is uneven.
-BLOCKS_PER_THREAD = 16
+# Blocks a search is cut into for each thread: the work in a block is uneven.  And pairs expected in a block, where that
+# makes fewer: to hand out one costs about 5 us.
+_BLOCKS_PER_THREAD = 16
+_PAIRS_PER_BLOCK = 2048
 
 # Room for this much more than a block was short of is given to the blocks that come after it.
 _MORE = 1.1
@@ -125,5 +127,6 @@ def collect(
             found, tested = search(first, last, keys)
         return keys[:found], tested
 
-    results = team.each(block, count, BLOCKS_PER_THREAD * team.threads)
+    most = _BLOCKS_PER_THREAD * team.threads
+    results = team.each(block, count, min(most, max(2 * team.threads, expected // _PAIRS_PER_BLOCK)))
     return [keys for keys, _ in results], sum(tested for _, tested in results)

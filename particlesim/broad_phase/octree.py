@@ -8,7 +8,6 @@ is searched against the leaves before it whose bounds overlap its own, so that e
 
 from __future__ import annotations
 
-import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -61,8 +60,8 @@ class NearList(NamedTuple):
     places: np.ndarray  # (_LIST + _OWN + LANES,) uint32, where they are in the tree
 
 
-# Where no axis is periodic.
-_NO_IMAGES = Images(np.zeros((1, 3), dtype=np.float32), np.zeros(3, dtype=np.float32))
+# Along an axis: no shift, or one period either way.
+_DIRECTIONS = np.array([0.0, 1.0, -1.0])
 
 
 @kernel
@@ -208,16 +207,28 @@ def _search(first, last, tree, images, keys):
     return append_overlaps(candidates, waiting, stored, keys, found), tested
 
 
+@kernel
+def _write_images(period, statistics, shifts, margin):
+    """Shifts to all images that can be nearest, none first, and the margin; how many shifts."""
+    scale = statistics[0].scale
+    for axis in range(3):
+        around = 2.0 * period[axis] + statistics[0].widest[axis]
+        margin[axis] = scale * (_ROUNDING * around + statistics[0].slack[axis]) if period[axis] > 0.0 else 0.0
+    number = 0
+    for k in range(27):
+        x, y, z = _DIRECTIONS[k // 9], _DIRECTIONS[k // 3 % 3], _DIRECTIONS[k % 3]
+        if (x == 0.0 or period[0] > 0.0) and (y == 0.0 or period[1] > 0.0) and (z == 0.0 or period[2] > 0.0):
+            shifts[number, 0] = x * scale * period[0]
+            shifts[number, 1] = y * scale * period[1]
+            shifts[number, 2] = z * scale * period[2]
+            number += 1
+    return number
+
+
 def _images(period: np.ndarray, statistics: np.ndarray) -> Images:
     """All images that can be nearest, in the unit cube that stands for the root cube."""
-    if not period.any():
-        return _NO_IMAGES
-    known = statistics[0]
-    scale = float(known["scale"])
-    axes = [(0.0, length, -length) if length > 0.0 else (0.0,) for length in (scale * period).tolist()]
-    shifts = np.array(list(itertools.product(*axes)), dtype=np.float32)
-    margin = scale * np.where(period > 0.0, _ROUNDING * (2.0 * period + known["widest"]) + known["slack"], 0.0)
-    return Images(shifts, margin.astype(np.float32))
+    shifts, margin = np.empty((27, 3), dtype=np.float32), np.empty(3, dtype=np.float32)
+    return Images(shifts[: _write_images(period, statistics, shifts, margin)], margin)
 
 
 def _candidates(aabbs: Aabbs, max_count: int, max_depth: int, team: ThreadTeam) -> tuple[list[np.ndarray], int, bool]:
