@@ -189,6 +189,39 @@ def test_few_random_particles_are_spread_evenly():
         assert kstest(position[:, axis], "uniform", args=(-2.0, 4.0)).pvalue > 0.01
 
 
+WIDE_SIZES = {
+    "two sizes": [spheres(20, 0.3), spheres(5, 0.001)],
+    "log-uniform": [spheres(1000, {"kind": "log-uniform", "low": 1e-4, "high": 0.4})],
+    "twelve digits": [spheres(1000, {"kind": "log-uniform", "low": 1e-12, "high": 0.4})],
+    "between fine ones": [spheres(4000, 0.002, placement="lattice"), spheres(50, 0.1), spheres(50, 0.01)],
+}
+
+
+@pytest.mark.parametrize("boundary", ["wall", "periodic"])
+@pytest.mark.parametrize("groups", WIDE_SIZES.values(), ids=WIDE_SIZES)
+def test_sizes_may_differ_as_widely_as_they_like(groups, boundary):
+    """What is looked into follows the particles: cells of the finest size would be 10^11 to 10^38."""
+    made = built(*groups, world={"boundary": boundary}, seed=8)
+    position, size = made.state.position, made.constants.size
+    apart = position[:, None] - position[None]
+    if boundary == "periodic":
+        apart -= 4.0 * np.round(apart / 4.0)
+    gap = np.linalg.norm(apart, axis=2) - 0.5 * (size[:, None] + size[None])
+    assert gap[np.triu_indices(len(size), 1)].min() > 0.0
+
+
+def test_clusters_are_as_many_as_they_say_whatever_the_sizes():
+    """Particles of every size are about the same centres; of more clusters than particles the rest is not made."""
+    placement = {"kind": "cluster", "clusters": 3, "spread": 1e-3}
+    sizes = {"kind": "log-uniform", "low": 1e-6, "high": 1e-4}
+    position = built(spheres(300, sizes, placement=placement), world={"size": [20] * 3}, seed=2).state.position
+    centres = np.array([position[k::3].mean(axis=0) for k in range(3)])
+    for k in range(3):
+        assert np.linalg.norm(position[k::3] - centres[k], axis=1).max() < 6e-3
+    alone = {"kind": "cluster", "clusters": 10**8, "spread": 1e-3}
+    assert len(np.unique(np.round(built(spheres(20, 1e-3, placement=alone)).state.position, 1), axis=0)) == 20
+
+
 def test_a_lattice_is_simple_cubic_and_centred():
     position = built(spheres(27, 0.2, placement={"kind": "lattice", "spacing": 0.5})).state.position
     steps = np.unique(np.round(position / 0.5, 9), axis=0)

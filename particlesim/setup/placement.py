@@ -18,7 +18,7 @@ from particlesim.scene.groups import (
     RandomPlacement,
     Region,
 )
-from particlesim.setup.random_insertion import Placed, empty_space, extents, put_in_place, try_in_place
+from particlesim.setup.random_insertion import Insertion, empty_space, extents, refile, try_in_place
 
 # Random trials a particle before it is said not to fit. Equal spheres jam at a fill of 0.38 (J. Feder, J. Theor. Biol.
 # 87 (1980) 237-254); a fill of 0.3 takes the last of 10^5 of them 6000.
@@ -46,36 +46,41 @@ def positions(
 
     Lists and lattices come first; the rest is put between them at random, the largest particles first.
     """
-    placed = empty_space(constants, world, len(constants.mass))
-    placed.orientation[:] = orientation
+    insertion = empty_space(constants, world, orientation)
+    position, level = insertion.body["position"], insertion.body["level"]
     below, above = extents(table, constants, orientation)
     groups = [np.flatnonzero(constants.group == g) for g in range(len(scene.particles))]
     for g, (group, members) in enumerate(zip(scene.particles, groups, strict=True)):
         if isinstance(group.placement, ListPlacement):
-            placed.position[members] = [pose.position for pose in group.placement.poses]
+            position[members] = [pose.position for pose in group.placement.poses]
         elif isinstance(group.placement, LatticePlacement):
-            room = (above[members] - below[members]).max(axis=0, initial=0.0)
-            placed.position[members] = _on_lattice(g, group.placement, world, len(members), room, randoms[g])
-        else:
-            continue
-        put_in_place(world, placed, members)
-    for level in range(int(placed.level.max(initial=-1)), -1, -1):
-        for g, (group, members) in enumerate(zip(scene.particles, groups, strict=True)):
-            if isinstance(group.placement, RandomPlacement | ClusterPlacement):
-                trials = _Trials(g, group.placement, world, below, above, randoms[g])
-                left = _insert((table, world, constants, placed), trials, members[placed.level[members] == level])
-                if left:
-                    raise _no_room(g, group, left)
-    return placed.position
+            extent = (above[members] - below[members]).max(axis=0, initial=0.0)
+            position[members] = _on_lattice(g, group.placement, world, len(members), extent, randoms[g])
+    inserted = {
+        g: _Trials(g, group.placement, world, (below, above), members, randoms[g])
+        for g, (group, members) in enumerate(zip(scene.particles, groups, strict=True))
+        if isinstance(group.placement, RandomPlacement | ClusterPlacement) and len(members)
+    }
+    in_place = np.flatnonzero(~np.isin(constants.group, list(inserted)))
+    for number in range(len(insertion.level) - 1, -1, -1):
+        if (level[in_place] < number).any() or number == len(insertion.level) - 1:
+            refile(insertion, in_place, number)
+        for g, trials in inserted.items():
+            members = groups[g][level[groups[g]] == number]
+            left = _insert(table, insertion, trials, members)
+            if left:
+                raise _no_room(g, scene.particles[g], left)
+            in_place = np.concatenate([in_place, members])
+    return np.ascontiguousarray(position)
 
 
-def _insert(where: tuple[ShapeTable, World, Constants, Placed], trials: _Trials, left: np.ndarray) -> int:
+def _insert(table: ShapeTable, insertion: Insertion, trials: _Trials, left: np.ndarray) -> int:
     """Put the particles of ``left`` (m,) at random between those in place; how many found no room."""
     before, look, tried = len(left), _FIRST_LOOK, 0
     while len(left) and tried < _MAX_TRIALS:
         each = max(_TRIALS_A_CALL // len(left), 1)
         proposals = trials.draw(np.repeat(left, each)).reshape(len(left), each, 3)
-        left = left[~try_in_place(*where, left, proposals)]
+        left = left[~try_in_place(table, insertion, left, proposals)]
         tried += each
         if tried >= look:
             if look > _FIRST_LOOK and len(left) > max(_CROWD, (1.0 - _PLACED_BY_DOUBLING) * before):
@@ -123,36 +128,36 @@ def _on_lattice(
     lattice: LatticePlacement,
     world: World,
     count: int,
-    room: np.ndarray,
+    extent: np.ndarray,
     random: np.random.Generator,
 ) -> np.ndarray:
-    """Lattice points, jittered within the gaps that particles of extent ``room`` (3,) leave."""
+    """Lattice points, jittered within the gaps that particles of extent ``extent`` (3,) leave."""
     lower, upper = _bounds(lattice.region, world)
     points, spacing = np.zeros((0, 3)), 1.0
     if count and _is_round(lattice.region):
-        points, spacing = _round_lattice(lower, upper, count, lattice.spacing, room)
+        points, spacing = _round_lattice(lower, upper, count, lattice.spacing, extent)
     elif count:
         points, spacing = lattice_points(lower, upper, count, lattice.spacing)
     if len(points) < count and lattice.spacing is not None:
         message = f"makes a lattice of {len(points):,} points here, for {count:,} particles"
         raise SceneError(message, f"particles[{g}].placement.spacing", lattice.spacing)
-    if (room > spacing).any():
-        span = f"the particles span {room.max():.4g} m"
+    if (extent > spacing).any():
+        span = f"the particles span {extent.max():.4g} m"
         if lattice.spacing is None:
             message = f"a lattice of so many points has a spacing of {spacing:.4g} m, but {span}"
             raise SceneError(message, f"particles[{g}].count", count)
         raise SceneError(f"too tight: {span}", f"particles[{g}].placement.spacing", lattice.spacing)
-    moved = points + random.uniform(-0.5, 0.5, points.shape) * (lattice.jitter * (spacing - room))
+    moved = points + random.uniform(-0.5, 0.5, points.shape) * (lattice.jitter * (spacing - extent))
     if _is_round(lattice.region):
-        outside = _from_middle(moved, lower + 0.5 * room, upper - 0.5 * room) > 1.0
+        outside = _from_middle(moved, lower + 0.5 * extent, upper - 0.5 * extent) > 1.0
         moved[outside] = points[outside]
     return moved
 
 
 def _round_lattice(
-    lower: np.ndarray, upper: np.ndarray, count: int, spacing: float | None, room: np.ndarray
+    lower: np.ndarray, upper: np.ndarray, count: int, spacing: float | None, extent: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """As ``lattice_points``, but those nearest to the middle of an ellipsoid in a box; particles span ``room`` (3,).
+    """As ``lattice_points``, but those nearest to the middle of an ellipsoid in a box; particles span ``extent`` (3,).
 
     Without a spacing, fewer come back only if the last one tried is too tight for the particles.
     """
@@ -160,9 +165,9 @@ def _round_lattice(
     tried = spacing or float((np.pi / 6.0 * edges.prod() / count) ** (1.0 / 3.0))
     while True:
         points, _ = lattice_points(lower, upper, np.iinfo(np.int64).max, tried)
-        distance = _from_middle(points, lower + 0.5 * room, upper - 0.5 * room)
+        distance = _from_middle(points, lower + 0.5 * extent, upper - 0.5 * extent)
         inside = np.argsort(distance, kind="stable")[: min(count, int(np.count_nonzero(distance <= 1.0)))]
-        if len(inside) == count or spacing is not None or (room > tried).any():
+        if len(inside) == count or spacing is not None or (extent > tried).any():
             return points[np.sort(inside)], tried
         tried *= 0.995
 
@@ -173,22 +178,30 @@ def _is_round(region: Region | None) -> bool:
 
 def _from_middle(points: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Distance of points (m, 3) from the middle of a box, 1 on the ellipsoid that just fits into it."""
-    # One without room has its middle only; what is off it is far away, by a number that has a square.
+    # One of no extent has its middle only; what is off it is far away, by a number that has a square.
     half = np.maximum(0.5 * (upper - lower), 1e-100)
     return np.linalg.norm((points - 0.5 * (lower + upper)) / half, axis=-1)
 
 
 def _centres(
-    g: int, where: ClusterPlacement, lower: np.ndarray, upper: np.ndarray, random: np.random.Generator
+    g: int,
+    where: ClusterPlacement,
+    bounds: tuple[np.ndarray, np.ndarray],
+    particles: int,
+    random: np.random.Generator,
 ) -> np.ndarray:
-    """Centres of the clusters, (clusters, 3) [m]."""
+    """Centres of the clusters, (clusters, 3) [m], but no more than there are ``particles`` to be about them."""
+    lower, upper = bounds
     is_round = _is_round(where.region)
+    number = min(where.clusters or 1, particles)
     if where.centres is None and is_round:
-        way = random.normal(size=(where.clusters or 1, 3))
-        way *= random.uniform(size=(len(way), 1)) ** (1.0 / 3.0) / np.linalg.norm(way, axis=1, keepdims=True)
-        return 0.5 * (lower + upper) + 0.5 * (upper - lower) * way
+        displacement = random.normal(size=(number, 3))
+        displacement *= random.uniform(size=(number, 1)) ** (1.0 / 3.0) / np.linalg.norm(
+            displacement, axis=1, keepdims=True
+        )
+        return 0.5 * (lower + upper) + 0.5 * (upper - lower) * displacement
     if where.centres is None:
-        return random.uniform(lower, upper, (where.clusters or 1, 3))
+        return random.uniform(lower, upper, (number, 3))
     for k, centre in enumerate(where.centres):
         outside = (np.array(centre) < lower).any() or (np.array(centre) > upper).any()
         if outside or (is_round and _from_middle(np.array(centre), lower, upper) > 1.0):
@@ -199,51 +212,55 @@ def _centres(
 
 
 class _Trials:
-    """Random proposals for the positions of a group's particles."""
+    """Random proposals for the positions of a group's particles.
+
+    ``extent`` are the lower and upper corners of all particles' AABBs relative to their centroids, (n, 3) each [m];
+    ``members`` (m,) the particles of the group.
+    """
 
     def __init__(
         self,
         g: int,
         where: RandomPlacement | ClusterPlacement,
         world: World,
-        below: np.ndarray,
-        above: np.ndarray,
+        extent: tuple[np.ndarray, np.ndarray],
+        members: np.ndarray,
         random: np.random.Generator,
     ) -> None:
         self._where, self._random = where, random
         lower, upper = _bounds(where.region, world)
         # A particle stays within its region, but where a region spans a periodic world only its centre does.
         free = (world.period > 0.0) & (lower <= world.lower) & (upper >= world.upper)
-        self._lower = lower - np.where(free, 0.0, below)
-        self._upper = upper - np.where(free, 0.0, above)
+        self._lower = lower - np.where(free, 0.0, extent[0])
+        self._upper = upper - np.where(free, 0.0, extent[1])
         self._centres = np.zeros((0, 3))
         if isinstance(where, ClusterPlacement):
-            self._centres = _centres(g, where, lower, upper, random)
+            self._centres = _centres(g, where, (lower, upper), int(members.max()) + 1, random)
         self._key = f"particles[{g}].size"
 
-    def draw(self, who: np.ndarray) -> np.ndarray:
-        """A position for each particle of ``who`` (m,), (m, 3)."""
-        lower, upper = self._lower[who], self._upper[who]
+    def draw(self, indices: np.ndarray) -> np.ndarray:
+        """A position for each particle of ``indices`` (m,), (m, 3)."""
+        lower, upper = self._lower[indices], self._upper[indices]
         if (lower > upper).any():
             raise SceneError("too large: there are particles wider than the region they are placed in", self._key)
-        points = self._proposed(who, lower, upper)
+        points = self._proposed(indices, lower, upper)
         is_round = _is_round(self._where.region)
-        # What falls outside is drawn again, so that the blob is cut off rather than piled up at the wall.
+        # What falls outside is drawn again, so that the cluster is cut off rather than piled up at the wall.
         for _ in range(100):
             outside = ((points < lower) | (points > upper)).any(axis=1)
             if is_round:
                 outside |= _from_middle(points, lower, upper) > 1.0
             if not outside.any():
                 return points
-            points[outside] = self._proposed(who[outside], lower[outside], upper[outside])
+            points[outside] = self._proposed(indices[outside], lower[outside], upper[outside])
         points = np.clip(points, lower, upper)
         if is_round:
             middle = 0.5 * (lower + upper)
             points = middle + (points - middle) / np.maximum(_from_middle(points, lower, upper), 1.0)[:, None]
         return points
 
-    def _proposed(self, who: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    def _proposed(self, indices: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
         if isinstance(self._where, RandomPlacement):
             return self._random.uniform(lower, upper)
-        around = self._centres[who % len(self._centres)]
-        return around + self._where.spread * self._random.normal(size=(len(who), 3))
+        centre = self._centres[indices % len(self._centres)]
+        return centre + self._where.spread * self._random.normal(size=(len(indices), 3))

@@ -1,4 +1,10 @@
-"""Random sequential insertion: putting particles one by one where they meet nobody, in time linear in their number."""
+"""Random sequential insertion: particles one by one where they overlap no other, in time linear in their number.
+
+Particles in place are found again by the cells they are in: a grid for each level of sizes, whose cells are as wide as
+its largest particle, hashed, so that empty cells take no memory. Particles are inserted from the largest level down.
+While those of one level are, all that are finer and in place already (from lists and lattices) are found by the cells
+of that level: no cell smaller than a particle is ever looked into, and no level without particles.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.core.constants import MAX_MANIFOLD, SPHERE
-from particlesim.core.jit import kernel
-from particlesim.core.math3d import dot, load_quat, load_vec3, store_vec3, sub
+from particlesim.core.jit import kernel, without_refcounts
+from particlesim.core.math3d import dot, load_quat, store_vec3, sub, to_vec3
 from particlesim.geometry.aabb import particle_extent
 from particlesim.geometry.narrow_phase.pair import nearest_image, pair_overlaps
 from particlesim.geometry.shape_table import ShapeTable
@@ -18,40 +24,61 @@ from particlesim.model.bodies import Constants, World
 # Cells along an axis: enough for any number of particles, few enough for whole numbers.
 _MOST_CELLS = 2**20
 
+# A particle that is in place, or waits to be.
+INSERTED = np.dtype(
+    [
+        ("position", "f8", (3,)),  # [m]
+        ("radius", "f8"),  # bounding sphere [m]
+        ("next", "i8"),  # in its bucket, -1 if none
+        ("shape", "i8"),
+        ("size", "f8"),
+        ("level", "i8"),  # of its size: particles of one level differ by less than a factor of 2
+        ("orientation", "f8", (4,)),
+    ]
+)
 
-class Placed(NamedTuple):
-    """Particles already in place, found again by a hash of the cell they are in."""
+# The cells of one level of sizes.
+LEVEL = np.dtype([("cells", "i8", (3,)), ("in_place", "i8")])
 
-    position: np.ndarray  # (n, 3)
-    orientation: np.ndarray  # (n, 4)
-    level: np.ndarray  # (n,) int64: particles of one level differ in size by less than a factor of 2
-    head: np.ndarray  # (buckets,) int64: last particle put in the bucket, -1 if none
-    behind: np.ndarray  # (n,) int64: the one before it in its bucket, -1 if none
-    cells: np.ndarray  # (levels, 3) int64: cells along each axis of the world; each as wide as its largest particle
+# The space that is filled.
+SPACE = np.dtype([("lower", "f8", (3,)), ("upper", "f8", (3,)), ("period", "f8", (3,))])
+
+
+class Insertion(NamedTuple):
+    """Particles already in place, and how they are found again."""
+
+    space: np.ndarray  # (1,) SPACE
+    body: np.ndarray  # (n,) INSERTED
+    level: np.ndarray  # (levels,) LEVEL, the finest first
+    bucket: np.ndarray  # (buckets,) int64: a particle in the bucket, -1 if there is none
 
 
 def extents(table: ShapeTable, constants: Constants, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper corners of the particles' boxes relative to their centroids, (n, 3) each [m]."""
+    """Lower and upper corners of the particles' AABBs relative to their centroids, (n, 3) each [m]."""
     below, above = np.empty((len(orientation), 3)), np.empty((len(orientation), 3))
     _write_extents(table, constants.shape, constants.size, orientation, below, above)
     return below, above
 
 
-def empty_space(constants: Constants, world: World, total: int) -> Placed:
-    """A world with nobody in it yet, made for ``total`` particles of these sizes."""
-    radius = constants.radius
-    least = radius.min(initial=math.inf)
-    level = np.floor(np.log2(radius / least)).astype(np.int64)
-    widths = np.array([2.0 * radius[level == k].max(initial=least) for k in range(level.max(initial=-1) + 1)])
-    edges = world.upper - world.lower
-    return Placed(
-        position=np.zeros((total, 3)),
-        orientation=np.zeros((total, 4)),
-        level=level,
-        head=np.full(1 << (2 * total).bit_length(), -1, dtype=np.int64),
-        behind=np.full(total, -1, dtype=np.int64),
-        cells=np.clip(np.floor(edges / widths[:, None]), 1.0, _MOST_CELLS).astype(np.int64),
-    )
+def levels_of(radius: np.ndarray) -> np.ndarray:
+    """Levels (n,) int64 of bounding radii (n,): 0 for the smallest, without gaps."""
+    octave = np.floor(np.log2(radius / radius.min(initial=math.inf))).astype(np.int64)
+    return ((np.bincount(octave) > 0).cumsum() - 1)[octave]
+
+
+def empty_space(constants: Constants, world: World, orientation: np.ndarray) -> Insertion:
+    """A world without particles yet, made for particles of these sizes and orientations (n, 4)."""
+    total = len(constants.radius)
+    space, body = np.zeros(1, dtype=SPACE), np.zeros(total, dtype=INSERTED)
+    space["lower"], space["upper"], space["period"] = world.lower, world.upper, world.period
+    body["orientation"], body["size"] = orientation, constants.size
+    body["radius"], body["shape"] = constants.radius, constants.shape
+    body["level"] = levels_of(constants.radius)
+    level = np.zeros(body["level"].max(initial=-1) + 1, dtype=LEVEL)
+    widths = np.zeros(len(level))
+    np.maximum.at(widths, body["level"], 2.0 * constants.radius)
+    level["cells"] = np.clip(np.floor((world.upper - world.lower) / widths[:, None]), 1.0, _MOST_CELLS)
+    return Insertion(space, body, level, np.full(1 << (2 * total).bit_length(), -1, dtype=np.int64))
 
 
 @kernel
@@ -64,114 +91,159 @@ def _write_extents(table, shape, size, orientation, below, above):
 
 
 @kernel
-def _bucket(level, x, y, z, buckets):
+def _bucket_of(level, cell, buckets):
     """A bucket for a cell: its numbers times large primes, mixed (M. Teschner et al., VMV 2003, 47-54)."""
-    mixed = (x * 73856093) ^ (y * 19349663) ^ (z * 83492791) ^ (level * 2654435761)
+    mixed = (cell[0] * 73856093) ^ (cell[1] * 19349663) ^ (cell[2] * 83492791) ^ (level * 2654435761)
     return mixed & (buckets - 1)
 
 
 @kernel
-def _cell_range(lower, upper, period, cells, coordinate, reach):
+def _cell_range(space, axis, cells, coordinate, reach):
     """First and last cell along an axis within ``reach`` of a coordinate; each cell of a periodic axis once."""
-    per_metre = cells / (upper - lower)
+    lower = space.lower[axis]
+    per_metre = cells / (space.upper[axis] - lower)
     first = math.floor((coordinate - reach - lower) * per_metre)
     last = math.floor((coordinate + reach - lower) * per_metre)
-    if period > 0.0 and last - first >= cells:
+    if space.period[axis] > 0.0 and last - first >= cells:
         return 0, cells - 1
     return first, last
 
 
-@kernel(inline=True)
-def _cells_about(lower, upper, period, cells, level, axis, coordinate, radius):
-    """First and last cell of a level along an axis with anything that a particle of ``radius`` may touch."""
+@kernel
+def _cells_about(space, axis, cells, coordinate, radius):
+    """First and last cell along an axis with the centre of anything that a particle of ``radius`` may overlap."""
     # A particle is in the cell of its centre and no wider than a cell: half a cell is as far as it reaches.
-    reach = radius + 0.5 * (upper[axis] - lower[axis]) / cells[level, axis]
-    return _cell_range(lower[axis], upper[axis], period[axis], cells[level, axis], coordinate, reach)
-
-
-@kernel(inline=True)
-def _bucket_at(lower, upper, period, cells, level, point, buckets):
-    """The bucket of the cell of a level that a point is in."""
-    x, _ = _cell_range(lower[0], upper[0], period[0], cells[level, 0], point[0], 0.0)
-    y, _ = _cell_range(lower[1], upper[1], period[1], cells[level, 1], point[1], 0.0)
-    z, _ = _cell_range(lower[2], upper[2], period[2], cells[level, 2], point[2], 0.0)
-    return _wrapped_bucket(period, cells, level, x, y, z, buckets)
-
-
-@kernel(inline=True)
-def _wrapped_bucket(period, cells, level, x, y, z, buckets):
-    """The bucket of a cell, whose numbers may have run past the ends of a periodic axis."""
-    x = x % cells[level, 0] if period[0] > 0.0 else x
-    y = y % cells[level, 1] if period[1] > 0.0 else y
-    z = z % cells[level, 2] if period[2] > 0.0 else z
-    return _bucket(level, x, y, z, buckets)
+    half = 0.5 * (space.upper[axis] - space.lower[axis]) / cells
+    return _cell_range(space, axis, cells, coordinate, radius + half)
 
 
 @kernel
-def put_in_place(world, placed, who):
-    """Count the particles of ``who`` (m,) as in place where they stand in ``placed``."""
-    lower, upper, period, cells = world.lower, world.upper, world.period, placed.cells
-    for i in who:
-        bucket = _bucket_at(
-            lower, upper, period, cells, placed.level[i], load_vec3(placed.position, i), len(placed.head)
-        )
-        placed.behind[i] = placed.head[bucket]
-        placed.head[bucket] = i
+def _wrapped(space, cells, cell):
+    """A cell, whose numbers may have run past the ends of periodic axes."""
+    x = cell[0] % cells[0] if space.period[0] > 0.0 else cell[0]
+    y = cell[1] % cells[1] if space.period[1] > 0.0 else cell[1]
+    z = cell[2] % cells[2] if space.period[2] > 0.0 else cell[2]
+    return x, y, z
 
 
-@kernel(inline=True)
-def _meets_any(
-    table, kind, shape, size, radius, lower, upper, period, position, orientation, head, behind, cells, i, point, points
-):
-    """Whether particle i at ``point`` touches anybody put in place before; the arrays are those of the structs."""
-    for level in range(len(cells)):
-        x0, x1 = _cells_about(lower, upper, period, cells, level, 0, point[0], radius[i])
-        y0, y1 = _cells_about(lower, upper, period, cells, level, 1, point[1], radius[i])
-        z0, z1 = _cells_about(lower, upper, period, cells, level, 2, point[2], radius[i])
-        wide, deep = x1 - x0 + 1, y1 - y0 + 1
-        # The cell of the point comes first: in a crowd most proposals fail there.
-        bucket = _bucket_at(lower, upper, period, cells, level, point, len(head))
-        for cell in range(wide * deep * (z1 - z0 + 1) + 1):
-            j = head[bucket]
-            while j >= 0:
-                offset = nearest_image(sub(load_vec3(position, j), point), period)
-                reach = radius[i] + radius[j]
-                if dot(offset, offset) <= reach * reach:
-                    if kind[shape[i]] == SPHERE and kind[shape[j]] == SPHERE:
-                        return True
-                    turn, other = load_quat(orientation, i), load_quat(orientation, j)
-                    if pair_overlaps(table, shape[i], size[i], turn, shape[j], size[j], other, offset, points):
-                        return True
-                j = behind[j]
-            x, y, z = x0 + cell % wide, y0 + cell // wide % deep, z0 + cell // (wide * deep)
-            bucket = _wrapped_bucket(period, cells, level, x, y, z, len(head))
+@kernel
+def _cell_at(space, cells, point):
+    """The cell that a point is in."""
+    x, _ = _cell_range(space, 0, cells[0], point[0], 0.0)
+    y, _ = _cell_range(space, 1, cells[1], point[1], 0.0)
+    z, _ = _cell_range(space, 2, cells[2], point[2], 0.0)
+    return _wrapped(space, cells, (x, y, z))
+
+
+@kernel
+def _file(insertion, i, number):
+    """Count particle i, where it is, among those in place that are found by the cells of level ``number``."""
+    space, body, level, buckets = insertion
+    cell = _cell_at(space[0], to_vec3(level[number].cells), to_vec3(body[i].position))
+    bucket = _bucket_of(number, cell, len(buckets))
+    body[i].next = buckets[bucket]
+    buckets[bucket] = i
+    level[number].in_place += 1
+
+
+@kernel
+def refile(insertion, indices, number):
+    """Find the particles ``indices`` (m,), all that are in place, by the cells of their level or of ``number``.
+
+    The coarser of the two: nothing finer is looked for from now on.
+    """
+    insertion.bucket[:] = -1
+    for k in range(len(insertion.level)):
+        insertion.level[k].in_place = 0
+    for i in indices:
+        _file(insertion, i, max(insertion.body[i].level, number))
+
+
+@kernel
+def _overlap(table, a, b, offset, points):
+    """Whether two particles whose bounding spheres overlap do; the centroid of b is at ``offset`` from that of a."""
+    if table.kind[a.shape] == SPHERE and table.kind[b.shape] == SPHERE:
+        return True
+    own, other = a.orientation, b.orientation
+    return pair_overlaps(
+        table,
+        a.shape,
+        a.size,
+        (own[0], own[1], own[2], own[3]),
+        b.shape,
+        b.size,
+        (other[0], other[1], other[2], other[3]),
+        offset,
+        points,
+    )
+
+
+@kernel
+def _overlaps_in(table, insertion, j, i, point, points):
+    """Whether particle i at ``point`` overlaps one in a bucket, of which j is the first."""
+    body = insertion.body
+    period = to_vec3(insertion.space[0].period)
+    radius = body[i].radius
+    while j >= 0:
+        other = body[j]
+        offset = nearest_image(sub(to_vec3(other.position), point), period)
+        reach = radius + other.radius
+        if dot(offset, offset) <= reach * reach and _overlap(table, body[i], other, offset, points):
+            return True
+        j = other.next
     return False
 
 
 @kernel
-def try_in_place(table, world, constants, placed, who, proposals):
-    """Put each particle of ``who`` (m,) at the first of its ``proposals`` (m, tries, 3) where it meets nobody.
+def _overlaps_on(table, insertion, number, i, point, points):
+    """Whether particle i at ``point`` overlaps one that is found by the cells of level ``number``."""
+    space, cells = insertion.space[0], to_vec3(insertion.level[number].cells)
+    buckets = insertion.bucket
+    # The cell of the point comes first: in a crowd most proposals fail there.
+    first = buckets[_bucket_of(number, _cell_at(space, cells, point), len(buckets))]
+    if first >= 0 and _overlaps_in(table, insertion, first, i, point, points):
+        return True
+    radius = insertion.body[i].radius
+    x0, x1 = _cells_about(space, 0, cells[0], point[0], radius)
+    y0, y1 = _cells_about(space, 1, cells[1], point[1], radius)
+    z0, z1 = _cells_about(space, 2, cells[2], point[2], radius)
+    for x in range(x0, x1 + 1):
+        for y in range(y0, y1 + 1):
+            for z in range(z0, z1 + 1):
+                first = buckets[_bucket_of(number, _wrapped(space, cells, (x, y, z)), len(buckets))]
+                # Most are empty, and a call that hands a table of shapes over takes longer than a look.
+                if first >= 0 and _overlaps_in(table, insertion, first, i, point, points):
+                    return True
+    return False
 
-    Returns whether there was one, (m,).
+
+@kernel
+def _overlaps_any(table, insertion, i, point, points):
+    """Whether particle i at ``point`` overlaps any in place, those that are finer by the cells of its level."""
+    for number in range(insertion.body[i].level, len(insertion.level)):
+        if insertion.level[number].in_place > 0 and _overlaps_on(table, insertion, number, i, point, points):
+            return True
+    return False
+
+
+@kernel
+def try_in_place(table, insertion, indices, proposals):
+    """Put each particle of ``indices`` (m,), all of one level, at the first of its ``proposals`` where it is free.
+
+    ``proposals`` (m, tries, 3) [m].  Returns whether there was one, (m,).  All that are finer and in place must have
+    been filed under this level (see ``refile``).
     """
+    table, insertion = without_refcounts(table), without_refcounts(insertion)
     points = np.empty((MAX_MANIFOLD, 3))
-    fits = np.zeros(len(who), dtype=np.bool_)
-    # Taken out of their structs once: each access counts references, which costs more than the arithmetic.
-    lower, upper, period, kind = world.lower, world.upper, world.period, table.kind
-    shape, size, radius = constants.shape, constants.size, constants.radius
-    position, orientation, level, head, behind, cells = placed
-    for k in range(len(who)):
-        i = who[k]
+    fits = np.zeros(len(indices), dtype=np.bool_)
+    for k in range(len(indices)):
+        i = indices[k]
         for attempt in range(proposals.shape[1]):
-            point = proposals[k, attempt, 0], proposals[k, attempt, 1], proposals[k, attempt, 2]
-            if not _meets_any(
-                table, kind, shape, size, radius, lower, upper, period,
-                position, orientation, head, behind, cells, i, point, points,
-            ):  # fmt: skip
-                store_vec3(position, i, point)
-                bucket = _bucket_at(lower, upper, period, cells, level[i], point, len(head))
-                behind[i] = head[bucket]
-                head[bucket] = i
+            point = to_vec3(proposals[k, attempt])
+            if not _overlaps_any(table, insertion, i, point, points):
+                for axis in range(3):
+                    insertion.body[i].position[axis] = point[axis]
+                _file(insertion, i, insertion.body[i].level)
                 fits[k] = True
                 break
     return fits
