@@ -8,11 +8,20 @@ import pytest
 from typer.testing import CliRunner
 
 from particlesim import Simulation
-from particlesim.benchmarks.broad_phase import compare_frames, compare_scene, sweep
+from particlesim.benchmarks.broad_phase import SceneComparison, compare_frames, compare_scene, figure, sweep
 from particlesim.benchmarks.broad_phase.boxes import make_boxes
 from particlesim.benchmarks.broad_phase.figure import _bar_colours
-from particlesim.benchmarks.broad_phase.measure import Found, Measured, digest, duration, measure_by_turns, peak_memory
+from particlesim.benchmarks.broad_phase.measure import (
+    Found,
+    Measured,
+    digest,
+    duration,
+    machine,
+    measure_interleaved,
+    peak_memory,
+)
 from particlesim.benchmarks.broad_phase.peers import peer_search, peers
+from particlesim.benchmarks.broad_phase.runs import Result
 from particlesim.benchmarks.broad_phase.stream import Stream, StreamError, read_stream, write_stream
 from particlesim.benchmarks.broad_phase.sweep import Sweep, SweepError, sizes_up_to
 from particlesim.broad_phase import METHODS
@@ -178,7 +187,7 @@ class TestMeasure:
     def test_turns_are_taken(self):
         calls = []
         searches = {name: lambda name=name: calls.append(name) or Found(3, 4) for name in "ab"}
-        measured = measure_by_turns(searches)
+        measured = measure_interleaved(searches)
         assert calls == list("ab") * (len(calls) // 2)
         assert measured["b"].found == (3, 4, None)
         assert measured["a"].row()["repeats"] == len(calls) // 2
@@ -294,6 +303,28 @@ class TestCommand:
         assert "fourth" in figure and "fifth" in figure
         colours = _bar_colours(["naive", "fourth", "grid", "fifth", "octree"])
         assert len(set(colours)) == 5
+
+    def test_a_scene_and_its_stream_do_not_overwrite_each_other(self, folder):
+        assert run("scene.toml", "--steps", "1", "--stream", "scene.aabb", "-q").exit_code == 0
+        before = (folder / "renders/compare_scene.json").read_bytes()
+        assert run("scene.aabb", "-q").exit_code == 0
+        assert (folder / "renders/compare_scene.json").read_bytes() == before
+        assert {"renders/compare_scene.json", "renders/compare_scene_stream.json"} <= set(files(folder))
+
+    def test_bars_are_in_proportion(self, folder, monkeypatch):
+        """2 : 1 looks like 2 : 1, whatever the rest."""
+        comparison = SceneComparison("a", 10, 1, 0, machine(), [])
+        comparison.results += [
+            Result("grid", search_seconds=1.1e-4, tested=2000, memory=10),
+            Result("octree", search_seconds=2.2e-4, tested=1000, memory=10),
+        ]
+        drawn = []
+        monkeypatch.setattr(figure, "_save", lambda shown, _: drawn.append(shown))
+        figure.draw_scene(comparison, folder / "bars")
+        for axes, ratio in zip(drawn[0].axes, (2.0, 0.5, 1.0), strict=True):
+            first, second = (bar.get_window_extent().height for bar in axes.patches)
+            assert second / first == pytest.approx(ratio)
+            assert axes.get_ylim()[0] == 0.0
 
     def test_a_sweep(self, folder):
         result = run("--sweep", "mixed", "--largest", "316")

@@ -1,4 +1,4 @@
-"""How fast pictures are drawn here, beside VTK where it is installed, so that anybody can repeat the figures.
+"""How fast pictures are drawn here, beside VTK where it is installed, so that the figures can be repeated anywhere.
 
 Each measurement is made in a process of its own: two libraries that open OpenGL contexts need not bear each other.
 """
@@ -36,17 +36,17 @@ SIZE = 1280, 720  # pixels
 _PICTURES = 9
 _NOT_COUNTED = 2
 
-# The particles fill this fraction of a cube, and this fraction of the way to their neighbours is jitter.
+# The particles fill this fraction of a cube, and jitter is this fraction of the distance to their neighbours.
 _FILL = 0.2
 _JITTER = 0.3
 
 # They move by this fraction of their radius from picture to picture, and the camera by so many seconds of a minute.
-_WAY = 0.1
+_DISPLACEMENT = 0.1
 _TURN = 0.1
 
 
 class Crowd(NamedTuple):
-    """Particles of unit volume a cell about the points of a lattice, in random order, turned at random.
+    """Particles of unit volume a cell about the points of a lattice, in random order and orientation.
 
     ``number`` (n,) of their shape, ``size`` (n,) [m], ``position`` (n, 3) [m], ``orientation`` (n, 4), ``velocity``
     (n, 3) [m/s]; ``edge`` [m] of the cube about the origin that they are in.
@@ -84,17 +84,17 @@ def crowd(kind: str, count: int, seed: int = 0) -> Crowd:
     cells = random.permutation(along**3)[:count]
     lattice = np.column_stack([cells % along, cells // along % along, cells // along**2])
     position = lattice + 0.5 * (1.0 - along) + _JITTER * random.uniform(-0.5, 0.5, (count, 3))
-    turn = random.normal(size=(count, 4))
+    orientation = random.normal(size=(count, 4))
     number = np.arange(count) % len(shapes)
     size = np.array([(_FILL / CATALOGUE[shape]().volume) ** (1.0 / 3.0) for shape in shapes])[number]
-    turn /= np.linalg.norm(turn, axis=1, keepdims=True)
-    return Crowd(shapes, float(along), number, size, position, turn, random.normal(size=(count, 3)))
+    orientation /= np.linalg.norm(orientation, axis=1, keepdims=True)
+    return Crowd(shapes, float(along), number, size, position, orientation, random.normal(size=(count, 3)))
 
 
 def run(
     counts: Sequence[int], progress: Callable[[str, int, int], None] | None = None, drawers: Sequence[str] | None = None
 ) -> Iterator[Drawn]:
-    """Measure each kind of particles with each number of them, by every drawer in turn.
+    """Measure each kind of particles with each number of them, by one drawer after the other.
 
     ``progress`` is called with what is measured, how many are done, and how many there will be. RenderError if this
     machine cannot draw.
@@ -171,5 +171,5 @@ def own_pictures(drawn: Crowd) -> Iterator[np.ndarray]:
 
 def _moved(drawn: Crowd, k: int) -> np.ndarray:
     """Where the particles are in picture ``k``: to and fro."""
-    way = _WAY * 0.5 * float(drawn.size.min())
-    return drawn.position + way * math.sin(k) * drawn.velocity
+    amplitude = _DISPLACEMENT * 0.5 * float(drawn.size.min())
+    return drawn.position + amplitude * math.sin(k) * drawn.velocity

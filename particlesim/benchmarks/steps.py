@@ -1,4 +1,4 @@
-"""How fast the simulation is here: whole time steps of gases, so that anybody can repeat the figures.
+"""How fast the simulation is here: whole time steps of gases, so that the figures can be repeated anywhere.
 
 Each gas is measured in a process of its own: memory that another one has left behind does not blur the figures.
 """
@@ -35,14 +35,14 @@ MEASUREMENTS = 5
 # Each measurement takes at least so long [s] and so many steps: the neighbours are found anew every fifth step or so.
 LEAST_SECONDS, _LEAST_STEPS = 1.0, 10
 
-# Steps before the first measurement: leashes and buffers get their sizes, and neighbours have been found anew.
+# Steps before the first measurement: skins and buffers get their sizes, and neighbours have been found anew.
 _STEPS_BEFORE = 6
 
 # A gas of so many is run first, for its kernels to be compiled and loaded.
 _FEW = 100
 
 # In one time step a particle of size 1 moves this fraction of its radius on average.
-_WAY = 0.05
+_DISPLACEMENT = 0.05
 
 # Fewer particles than this take less memory than what comes and goes in the process.
 _FEWEST_WEIGHED = 10_000
@@ -112,7 +112,7 @@ class Speed:
 
 def time_step() -> float:
     """The time step of all gases [s]: the mean speed at temperature T is sqrt(8 T / (pi m))."""
-    return _WAY * 0.5 / math.sqrt(8.0 / math.pi)
+    return _DISPLACEMENT * 0.5 / math.sqrt(8.0 / math.pi)
 
 
 def run(
@@ -161,7 +161,7 @@ def _measured_apart(what: Task, tell: Callable[[int], None]) -> Speed:
 
 def _work(pipe: Connection, what: Task) -> None:
     """What the other process does: it sends how many measurements are done, then the result."""
-    # Ctrl-C reaches it as well, but it is ended by the one who started it.
+    # Ctrl-C reaches it as well, but the process that started it ends it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     gas, _, threads, _ = what
     Simulation(gas.scene(_FEW), threads=threads).run(steps=_STEPS_BEFORE)

@@ -1,4 +1,4 @@
-"""The same crowd drawn by VTK, off screen: what the drawing of movies is measured against.
+"""The same particles drawn by VTK, off screen: what the drawing of movies is measured against.
 
 Spheres are VTK's own fast path, point sprites shaded as spheres; hulls are glyphs. Without shadows and without smooth
 edges, which would take VTK longer.
@@ -87,9 +87,9 @@ def _points(drawn: Any, members: np.ndarray) -> tuple[vtkPoints, vtkPolyData]:
     colour = numpy_to_vtk(np.column_stack([shade, 255 - shade, np.full_like(shade, 120)]), deep=1)
     colour.SetName("colour")
     data.GetPointData().SetScalars(colour)
-    turn = numpy_to_vtk(drawn.orientation[members].astype(np.float32), deep=1)
-    turn.SetName("turn")
-    data.GetPointData().AddArray(turn)
+    orientation = numpy_to_vtk(drawn.orientation[members].astype(np.float32), deep=1)
+    orientation.SetName("orientation")
+    data.GetPointData().AddArray(orientation)
     return points, data
 
 
@@ -111,7 +111,7 @@ def _glyphs(data: vtkPolyData, shape: str, drawn: Any, members: np.ndarray) -> v
     mapper.SetScaleFactor(float(drawn.size[members[0]]))
     mapper.OrientOn()
     mapper.SetOrientationModeToQuaternion()
-    mapper.SetOrientationArray("turn")
+    mapper.SetOrientationArray("orientation")
     return mapper
 
 

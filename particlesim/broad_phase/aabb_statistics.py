@@ -9,7 +9,7 @@ from particlesim.core.jit import kernel
 from particlesim.core.parallel import ThreadTeam
 
 # The typical place and size are taken from this many AABBs, picked by multiples of a prime modulo their number:
-# no pattern in the order of the particles is met in step.
+# a pattern in the order of the particles does not matter.
 SAMPLE = 64
 _PRIME = 2654435761
 

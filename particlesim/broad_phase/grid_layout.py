@@ -78,7 +78,7 @@ def _take_cells(given, extent, grid):
 
 @kernel
 def _set_reach(extent, grid):
-    """Cells per metre and the reach.  An axis that wraps, on which the reach would meet itself, gets one cell."""
+    """Cells per metre and the reach.  An axis that wraps, on which the reach would overlap itself, gets one cell."""
     for axis in range(3):
         cells = grid.cells[axis]
         grid.wraps[axis] = int(grid.period[axis] > 0.0 or grid.buckets[axis] < cells)

@@ -121,7 +121,8 @@ def compare(
 
         is_stream = source is not None and source.suffix.lower() == ".aabb"
         scene = load(source) if source is not None and not is_stream else None
-        with place_for(output, Path(f"compare_{source.stem if source else sweep}"), ".json", ".svg", ".png") as path:
+        name = f"{source.stem}_stream" if source and is_stream else source.stem if source else sweep
+        with place_for(output, Path(f"compare_{name}"), ".json", ".svg", ".png") as path:
             with shown_progress(quiet, "particle" if sweep else "step") as progress:
                 settings: dict[str, Any] = {"limit": limit, "threads": threads, "progress": progress}
                 if scene is not None and source is not None:

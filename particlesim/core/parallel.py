@@ -46,8 +46,8 @@ def use_threads(count: int | None) -> None:
 def limit_threads(count: int | None) -> Iterator[None]:
     """Let teams that the code inside makes have ``count`` threads; None leaves things as they are.
 
-    It concerns the thread that runs this code and nothing else: two simulations in one process, in turn or at the same
-    time, each keep their own number.
+    It concerns the thread that runs this code and nothing else: two simulations in one process, one after the other or
+    at the same time, each keep their own number.
 
     Parameters
     ----------

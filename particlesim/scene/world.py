@@ -44,6 +44,12 @@ class World(Model):
     gravity: Vector = (0.0, 0.0, 0.0)  # [m/s^2]
     restitution: Fraction = 1.0
 
+    @property
+    def period(self) -> tuple[float, float, float]:
+        """Edges of the periodic axes [m], 0 of the others."""
+        x, y, z = (edge if kind == "periodic" else 0.0 for edge, kind in zip(self.size, self.boundary, strict=True))
+        return x, y, z
+
 
 class Naive(Model):
     """Every pair: the reference."""
@@ -70,7 +76,7 @@ _BroadPhases = Annotated[Naive | Grid | Octree, Field(discriminator="kind")]
 
 
 class Solver(Model):
-    """How the motion is computed. None of it changes which pairs meet."""
+    """How the motion is computed. None of it changes which pairs collide."""
 
     broad_phase: Annotated[
         _BroadPhases,

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from particlesim.broad_phase import find_pairs
 from particlesim.core.constants import (
@@ -21,6 +20,7 @@ from particlesim.core.constants import (
     WALL,
     WALL_NAMES,
 )
+from particlesim.core.rotations import quaternions_of, rotations_of
 from particlesim.geometry.shape_table import ShapeTable, stack_shapes
 from particlesim.geometry.shapes import CATALOGUE, Shape
 from particlesim.model.bodies import Constants, State, World, particle_constants
@@ -209,8 +209,7 @@ def _quaternion(orientation: tuple[float, ...] | Turn | str) -> np.ndarray:
 
 def _turned(q: np.ndarray, into: np.ndarray) -> np.ndarray:
     """Orientations (k, 4) of the described axes as orientations of the body axes that ``into`` turns into them."""
-    product = Rotation.from_quat(np.roll(q, -1, axis=-1)) * Rotation.from_quat(np.roll(into, -1))
-    return np.roll(product.as_quat(), 1, axis=-1)
+    return quaternions_of(rotations_of(q) * rotations_of(into))
 
 
 def _orientations(

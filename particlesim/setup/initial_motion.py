@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from particlesim.core.rotations import rotations_of
 from particlesim.model.bodies import Constants, State
 from particlesim.scene import Scene
 from particlesim.scene.groups import (
@@ -63,9 +63,9 @@ def _velocities(group: Group, position: np.ndarray, mass: np.ndarray, random: np
     elif isinstance(law, FixedVelocity):
         velocity = np.tile(law.vector, (count, 1))
     elif isinstance(law, RadialVelocity):
-        arm = position - law.centre
-        distance = np.linalg.norm(arm, axis=1, keepdims=True)
-        outward = np.divide(arm, distance, out=np.zeros_like(arm), where=distance > 0.0)
+        offset = position - law.centre
+        distance = np.linalg.norm(offset, axis=1, keepdims=True)
+        outward = np.divide(offset, distance, out=np.zeros_like(offset), where=distance > 0.0)
         velocity = outward * (law.speed if law.kind == "outward" else -law.speed)
     else:
         velocity = np.zeros((count, 3))
@@ -79,9 +79,9 @@ def _angular_momenta(
     law, count = group.spin, len(orientation)
     if not count:
         return np.zeros((0, 3))
-    turn = Rotation.from_quat(np.roll(orientation, -1, axis=1))
+    rotation = rotations_of(orientation)
     if isinstance(law, SpinMaxwell):
-        spin = turn.apply(np.sqrt(law.temperature / inertia) * random.normal(size=(count, 3)))
+        spin = rotation.apply(np.sqrt(law.temperature / inertia) * random.normal(size=(count, 3)))
     elif isinstance(law, SpinUniform):
         spin = law.speed * _directions(random, count)
     elif isinstance(law, FixedVelocity):
@@ -89,7 +89,7 @@ def _angular_momenta(
     else:
         spin = np.zeros((count, 3))
     spin = _overridden(group, spin, "spin")
-    return turn.apply(inertia * turn.apply(spin, inverse=True))
+    return rotation.apply(inertia * rotation.apply(spin, inverse=True))
 
 
 def _overridden(group: Group, values: np.ndarray, key: str) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.core.constants import SPHERE
+from particlesim.core.rotations import matrices_of
 from particlesim.trajectory.frames import Frame, Header
 
 
@@ -17,18 +18,7 @@ def frame_boxes(header: Header, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
         if shape.kind == SPHERE:
             low, high = -0.5 * size, 0.5 * size
         else:
-            vertices = np.einsum("nij,vj->nvi", _matrices(frame.orientation[members]), shape.vertices)
+            vertices = np.einsum("nij,vj->nvi", matrices_of(frame.orientation[members]), shape.vertices)
             low, high = size * vertices.min(axis=1), size * vertices.max(axis=1)
         lower[members], upper[members] = frame.position[members] + low, frame.position[members] + high
     return lower, upper
-
-
-def _matrices(orientation: np.ndarray) -> np.ndarray:
-    """Rotation matrices (n, 3, 3) of unit quaternions (n, 4), body to world."""
-    w, x, y, z = orientation.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)

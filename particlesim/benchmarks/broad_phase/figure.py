@@ -57,8 +57,10 @@ def draw_scene(comparison: SceneComparison, path: Path) -> list[Path]:
     names = [result.method for result in comparison.ran]
     for axes, (value, label) in zip(figure.subplots(1, len(panels)), panels, strict=True):
         heights = [getattr(result, value) for result in comparison.ran]
-        axes.bar(names, heights, color=_bar_colours(names), width=0.6)
-        axes.set(yscale="log", title=label)
+        bars = axes.bar(names, heights, color=_bar_colours(names), width=0.6)
+        # Lengths of bars are compared: they start at 0 and are in proportion; what is too short to see has its number.
+        axes.bar_label(bars, labels=[f"{height:.3g}" for height in heights], fontsize=8)
+        axes.set(title=label, ylim=(0.0, 1.12 * max(heights, default=1.0)))
         axes.title.set_size(9)
     about = f"{comparison.name}: {comparison.boxes:,} boxes, {comparison.frames} frames"
     figure.suptitle(f"{about}, {machine_words(comparison.machine)}", fontsize=10)

@@ -62,8 +62,8 @@ class Measured:
         }
 
 
-def measure_by_turns(searches: Mapping[str, Search]) -> dict[str, Measured]:
-    """Run every search in turn, again and again: what else the machine does falls on all of them alike."""
+def measure_interleaved(searches: Mapping[str, Search]) -> dict[str, Measured]:
+    """Run every search once, then all again, and so on: what else the machine does falls on all of them alike."""
     results = {name: Measured() for name in searches}
     for _ in range(MOST_REPEATS):
         for name, search in searches.items():
@@ -111,7 +111,7 @@ def digest(found: Found) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A time as people say it."""
+    """A time in a unit that suits it."""
     for unit, length in (("d", 86400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= length:
             return f"{seconds / length:.1f} {unit}"

@@ -14,7 +14,7 @@ from particlesim.benchmarks.broad_phase.measure import (
     digest,
     duration,
     machine,
-    measure_by_turns,
+    measure_interleaved,
     naive_seconds,
     ours,
     peak_memory,
@@ -114,7 +114,7 @@ def compare_scene(
     comparison = compare_frames(
         frames,
         name,
-        period=_period(scene),
+        period=np.array(scene.world.period),
         repeats=steps,
         limit=limit,
         parameters=_parameters(scene),
@@ -158,7 +158,7 @@ def compare_frames(
         }
         for search in searches.values():
             search()  # compiles
-        for method, measured in measure_by_turns(searches).items():
+        for method, measured in measure_interleaved(searches).items():
             result = results[method]
             result.tested = (result.tested or 0) + (measured.found.tested or 0)
             result.pairs = (result.pairs or 0) + measured.found.size
@@ -212,12 +212,6 @@ def _simulate(scene: Scene, result: Result, steps: int, threads: int | None, pro
     ledger = simulation.ledger
     result.step_tested, result.step_pairs = ledger.pairs_tested, ledger.candidate_pairs
     result.state_hash = simulation.state_hash()
-
-
-def _period(scene: Scene) -> np.ndarray:
-    """Edges (3,) [m] of the world's periodic axes, 0 for the others."""
-    pairs = zip(scene.world.size, scene.world.boundary, strict=True)
-    return np.array([edge if boundary == "periodic" else 0.0 for edge, boundary in pairs])
 
 
 def _parameters(scene: Scene) -> dict[str, dict[str, Any]]:

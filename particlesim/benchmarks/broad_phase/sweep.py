@@ -17,7 +17,7 @@ from particlesim.benchmarks.broad_phase.measure import (
     digest,
     duration,
     machine,
-    measure_by_turns,
+    measure_interleaved,
     ours,
 )
 from particlesim.benchmarks.broad_phase.peers import peer_search, peers
@@ -115,7 +115,7 @@ def sweep(
             if expected > limit:
                 result.stopped[name] = f"stops before {count:,} boxes, which would take about {duration(expected)}"
         searches = _searches(kind, count, [name for name in going if name not in result.stopped])
-        measured = measure_by_turns(searches)
+        measured = measure_interleaved(searches)
         for name, search in measured.items():
             result.rows.append({"method": name, "boxes": count, **search.row()})
         result.disagree += _disagreement(measured, count)
