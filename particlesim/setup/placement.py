@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from particlesim.geometry.aabb import aabbs_of
 from particlesim.geometry.shape_table import ShapeTable
 from particlesim.model.bodies import Constants, World
 from particlesim.scene import Scene
@@ -18,7 +19,7 @@ from particlesim.scene.groups import (
     RandomPlacement,
     Region,
 )
-from particlesim.setup.random_insertion import Insertion, empty_space, extents, refile, try_in_place
+from particlesim.setup.random_insertion import Insertion, empty_space, refile, try_in_place
 
 # Random trials a particle before it is said not to fit. Equal spheres jam at a fill of 0.38 (J. Feder, J. Theor. Biol.
 # 87 (1980) 237-254); a fill of 0.3 takes the last of 10^5 of them 6000.
@@ -48,7 +49,7 @@ def positions(
     """
     insertion = empty_space(constants, world, orientation)
     position, level = insertion.body["position"], insertion.body["level"]
-    below, above = extents(table, constants, orientation)
+    below, above = aabbs_of(table, constants.shape, constants.size, orientation)
     groups = [np.flatnonzero(constants.group == g) for g in range(len(scene.particles))]
     for g, (group, members) in enumerate(zip(scene.particles, groups, strict=True)):
         if isinstance(group.placement, ListPlacement):

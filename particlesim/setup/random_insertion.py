@@ -15,10 +15,8 @@ import numpy as np
 
 from particlesim.core.constants import MAX_MANIFOLD, SPHERE
 from particlesim.core.jit import kernel, without_refcounts
-from particlesim.core.math3d import dot, load_quat, store_vec3, sub, to_vec3
-from particlesim.geometry.aabb import particle_extent
+from particlesim.core.math3d import dot, sub, to_vec3
 from particlesim.geometry.narrow_phase.pair import nearest_image, pair_overlaps
-from particlesim.geometry.shape_table import ShapeTable
 from particlesim.model.bodies import Constants, World
 
 # Cells along an axis: enough for any number of particles, few enough for whole numbers.
@@ -53,13 +51,6 @@ class Insertion(NamedTuple):
     bucket: np.ndarray  # (buckets,) int64: a particle in the bucket, -1 if there is none
 
 
-def extents(table: ShapeTable, constants: Constants, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper corners of the particles' AABBs relative to their centroids, (n, 3) each [m]."""
-    below, above = np.empty((len(orientation), 3)), np.empty((len(orientation), 3))
-    _write_extents(table, constants.shape, constants.size, orientation, below, above)
-    return below, above
-
-
 def levels_of(radius: np.ndarray) -> np.ndarray:
     """Levels (n,) int64 of bounding radii (n,): 0 for the smallest, without gaps."""
     octave = np.floor(np.log2(radius / radius.min(initial=math.inf))).astype(np.int64)
@@ -79,15 +70,6 @@ def empty_space(constants: Constants, world: World, orientation: np.ndarray) -> 
     np.maximum.at(widths, body["level"], 2.0 * constants.radius)
     level["cells"] = np.clip(np.floor((world.upper - world.lower) / widths[:, None]), 1.0, _MOST_CELLS)
     return Insertion(space, body, level, np.full(1 << (2 * total).bit_length(), -1, dtype=np.int64))
-
-
-@kernel
-def _write_extents(table, shape, size, orientation, below, above):
-    kind, vertices, start = table.kind, table.vertex, table.vertex_start
-    for i in range(len(shape)):
-        lower, upper = particle_extent(kind, vertices, start, shape[i], size[i], load_quat(orientation, i))
-        store_vec3(below, i, lower)
-        store_vec3(above, i, upper)
 
 
 @kernel
