@@ -18,7 +18,7 @@ from particlesim.broad_phase.morton import LEVELS, codes_of
 from particlesim.broad_phase.octree_build import build, fit, in_order, sort_by_code
 from particlesim.broad_phase.pair_sort import sort_pairs
 from particlesim.broad_phase.soa_aabb import LANES, child_bits, load_soa, lowest, may_overlap, overlap_bits
-from particlesim.core.jit import kernel
+from particlesim.core.jit import kernel, without_refcounts
 from particlesim.core.math3d import to_vec3
 from particlesim.core.parallel import ThreadTeam
 
@@ -171,8 +171,9 @@ def _test_list(span, near, image, soa, stored, candidates, keys, progress):
 @kernel
 def _search(first, last, tree, images, keys):
     """Pairs within the leaves ``first .. last`` and between them and the leaves before them: (found, tested)."""
-    nodes, node_soa, leaves, soa, stored = tree
+    nodes, node_soa, leaves, soa, stored = without_refcounts(tree)
     shifts, margin = images
+    keys = without_refcounts(keys)
     stack = np.empty(_STACK, dtype=np.uint32)
     ranges = np.empty((leaves.size, 2), dtype=np.int32)
     near = (
