@@ -19,17 +19,6 @@ def quaternions_of(rotations: Rotation, *, canonical: bool = False) -> np.ndarra
     return np.roll(rotations.as_quat(canonical=canonical), 1, axis=-1)
 
 
-def matrices_of(quaternions: np.ndarray) -> np.ndarray:
-    """Rotation matrices (n, 3, 3) of unit quaternions (n, 4), body to world."""
-    w, x, y, z = quaternions.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
-
-
 def quaternion_products(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Products (n, 4) of the rows of two arrays (n, 4) of quaternions: the rotations q followed by p."""
     # Column by column, which takes numpy a fifth of the time that rows do.
