@@ -25,12 +25,14 @@ if TYPE_CHECKING:
     from particlesim.rendering import RenderError
     from particlesim.scene import Scene
     from particlesim.scene.file import SceneError, load_scene
+    from particlesim.simulation.checkpoint import CheckpointError
     from particlesim.simulation.simulation import Simulation, SimulationError
     from particlesim.trajectory.frames import Ledger
     from particlesim.trajectory.gsd_file import Trajectory, TrajectoryError
 
 _HOMES = {
     "CATALOGUE": "geometry.shapes",
+    "CheckpointError": "simulation.checkpoint",
     "Ledger": "trajectory.frames",
     "Pose": "geometry.separation",
     "RenderError": "rendering",
@@ -52,6 +54,7 @@ _HOMES = {
 
 __all__ = [
     "CATALOGUE",
+    "CheckpointError",
     "Ledger",
     "Pose",
     "RenderError",

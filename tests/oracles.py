@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
+from particlesim.core.constants import CAPSULE, POLYHEDRON, SPHERE
 from particlesim.geometry import shapes
 
 # Both searches of coal stop here [fraction of the distance, and m].
@@ -29,9 +30,11 @@ def triangles(shape):
 
 
 def coal_geometry(shape, size=1.0):
-    """A shape of the given size as coal has it."""
-    if not len(shape.vertices):
+    """A shape of the given size as coal has it; of a rounded polyhedron, its core."""
+    if shape.kind == SPHERE:
         return coal.Sphere(0.5 * size)
+    if shape.kind == CAPSULE:
+        return coal.Capsule(0.5 * size, size * np.ptp(shape.vertices[:, 2]))
     points = coal.StdVec_Vec3s()
     points.extend(list(size * shape.vertices))
     faces = coal.StdVec_Triangle()
@@ -49,6 +52,11 @@ def coal_distance(geometry_a, turn_a, geometry_b, turn_b, offset):
     pose_b = coal.Transform3s(rotation(turn_b), np.asarray(offset, dtype=np.float64))
     distance = coal.distance(geometry_a, pose_a, geometry_b, pose_b, request, result)
     return distance, np.array(result.normal)
+
+
+def coal_rounding(shape, size=1.0):
+    """How far the surface of a shape is outside of what coal has."""
+    return size * shape.rounding if shape.kind == POLYHEDRON else 0.0
 
 
 def _nearest_on_triangle(a, b, c):
@@ -80,16 +88,41 @@ def difference_distance(points_a, points_b):
     return float(_nearest_on_triangle(a[front], b[front], c[front]).min())
 
 
-def hull_distance(point, shape, size, turn, centre):
-    """Signed distance of a point from a hull's surface: negative inside."""
-    local = (np.asarray(point) - np.asarray(centre)) @ rotation(turn)
-    vertices = size * shape.vertices
+def segment_gap(a, b, c, d):
+    """The shortest vector from segment ab to segment cd: between the lines if inside of both, else from an end."""
+    u, v, w = b - a, d - c, a - c
+    gaps = []
+    for start, along, ends, sign in ((a, u, (c, d), 1.0), (c, v, (a, b), -1.0)):
+        for end in ends:
+            t = np.clip((end - start) @ along / max(along @ along, 1e-300), 0.0, 1.0)
+            gaps.append(sign * (end - start - t * along))
+    system = np.array([[u @ u, -(u @ v)], [u @ v, -(v @ v)]])
+    if abs(np.linalg.det(system)) > 1e-14 * (u @ u) * (v @ v):
+        s, t = np.linalg.solve(system, -np.array([u @ w, v @ w]))
+        if 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0:
+            gaps.append(t * v - s * u - w)
+    return min(gaps, key=np.linalg.norm)
+
+
+def core_distance(points_a, points_b):
+    """Signed distance of two cores by their vertices (v, 3): points, segments or polyhedra."""
+    if len(points_a) <= 2 and len(points_b) <= 2:
+        return float(np.linalg.norm(segment_gap(points_a[0], points_a[-1], points_b[0], points_b[-1])))
+    return difference_distance(points_a, points_b)
+
+
+def surface_distance(point, shape, size, turn, centre):
+    """Signed distance of a point from a shape's surface: negative inside."""
+    local, vertices = (np.asarray(point) - np.asarray(centre)) @ rotation(turn), size * shape.vertices
+    if shape.kind != POLYHEDRON:
+        t = np.clip(local[2], vertices[0, 2], vertices[-1, 2])
+        return float(np.linalg.norm(local - (0.0, 0.0, t))) - size * shape.rounding
     hull = ConvexHull(vertices)
     heights = hull.equations[:, :3] @ local + hull.equations[:, 3]
     if heights.max() <= 0.0:
-        return float(heights.max())
+        return float(heights.max()) - size * shape.rounding
     a, b, c = (vertices[hull.simplices[:, k]] - local for k in range(3))
-    return float(_nearest_on_triangle(a, b, c).min())
+    return float(_nearest_on_triangle(a, b, c).min()) - size * shape.rounding
 
 
 def zoo():
@@ -108,6 +141,13 @@ def zoo():
         "tetrahedron": shapes.tetrahedron(),
         "hull30": shapes.hull("hull30", random.normal(size=(30, 3))),
         "hull96": shapes.hull("hull96", ball / np.linalg.norm(ball, axis=1)[:, None]),
+        "capsule": shapes.capsule(1.0),
+        "needle": shapes.capsule(50.0),
+        "stub": shapes.capsule(1e-3),
+        "rounded cube": shapes.CATALOGUE["cube"](rounding=0.2),
+        "rounded plate": shapes.box((1.0, 1.0, 0.001), rounding=0.05),
+        "pebble": shapes.hull("pebble", random.normal(size=(12, 3)), rounding=1.5),
+        "egg": shapes.pyramid(0.02, rounding=2.0),
     }
 
 

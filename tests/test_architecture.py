@@ -26,6 +26,7 @@ FLOORS = [
 ]
 FLOOR = {name: level for level, names in enumerate(FLOORS) for name in names}
 SOURCES = sorted(PACKAGE.rglob("*.py"))
+TESTS = sorted(Path(__file__).parent.glob("*.py"))
 
 
 def room(path):
@@ -78,6 +79,79 @@ def test_every_module_says_what_it_is_and_is_a_room_one_can_know(path):
     text = path.read_text(encoding="utf-8")
     assert ast.get_docstring(ast.parse(text)), "no docstring"
     assert len(text.splitlines()) <= 400
+
+
+def decorated(function):
+    """The names of a function's decorators."""
+    return {ast.unparse(d).split("(")[0] for d in function.decorator_list}
+
+
+def kernels_of(tree):
+    """The kernels that a source defines."""
+    return [
+        node for node in tree.body if isinstance(node, ast.FunctionDef) and decorated(node) & {"kernel", "entry_kernel"}
+    ]
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_kernels_take_at_most_eight_parameters(path):
+    for kernel in kernels_of(ast.parse(path.read_text(encoding="utf-8"))):
+        assert len(kernel.args.args) <= 8, kernel.name
+
+
+def module_of(path):
+    """The dotted name of a source of the package, or of a test."""
+    if not path.is_relative_to(PACKAGE):
+        return f"tests.{path.stem}"
+    return ".".join(["particlesim", *path.relative_to(PACKAGE).with_suffix("").parts]).removesuffix(".__init__")
+
+
+def inner_kernels():
+    """(module, name) of all kernels without a Python wrapper: calling one from Python crashes."""
+    return {
+        (module_of(path), kernel.name)
+        for path in [*SOURCES, *TESTS]
+        for kernel in kernels_of(ast.parse(path.read_text(encoding="utf-8")))
+        if "kernel" in decorated(kernel)
+    }
+
+
+def called_from_python(tree, module):
+    """(module, name) of all that code outside kernels calls by name."""
+    homes = {
+        alias.asname or alias.name: (node.module, alias.name)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module
+        for alias in node.names
+    }
+    waiting, found = [tree], set()
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.FunctionDef) and decorated(node) & {"kernel", "entry_kernel"}:
+            continue
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            found.add(homes.get(node.func.id, (module, node.func.id)))
+        waiting.extend(ast.iter_child_nodes(node))
+    return found
+
+
+@pytest.mark.parametrize("path", [*SOURCES, *TESTS], ids=lambda p: p.name)
+def test_python_calls_entry_kernels_only(path):
+    called = called_from_python(ast.parse(path.read_text(encoding="utf-8")), module_of(path))
+    assert not called & inner_kernels()
+
+
+def test_no_loose_modules_at_the_top():
+    assert {path.stem for path in PACKAGE.glob("*.py")} == {"__init__", "__main__"}
+
+
+@pytest.mark.parametrize("floor", ["model", "dynamics", "setup", "simulation"])
+def test_the_kind_of_a_shape_is_asked_for_in_geometry(floor):
+    for path in (PACKAGE / floor).rglob("*.py"):
+        names = {
+            node.id for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Name)
+        }
+        assert not names & {"SPHERE", "CAPSULE", "POLYHEDRON", "HALF_SPACE"}, path.name
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(PACKAGE)))

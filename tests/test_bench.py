@@ -19,8 +19,8 @@ def run(*arguments):
 def test_a_gas_is_what_it_says(gas, fill):
     sim = Simulation(gas.scene(400))
     particles = sim.particles
-    volumes = np.array([shape.volume for shape in sim.shapes])[particles.shape] * particles.size**3
-    assert volumes.sum() / np.prod(sim.world.upper - sim.world.lower) == pytest.approx(fill, rel=1e-12)
+    volumes = np.array([shape.volume for shape in sim.model.shapes])[particles.shape] * particles.size**3
+    assert volumes.sum() / np.prod(sim.scene.world.size) == pytest.approx(fill, rel=1e-12)
     assert sorted(np.bincount(particles.shape)) == sorted([400] if len(gas.volumes) == 1 else [133, 133, 134])
     # Means of some hundreds: a few standard errors, of 42 and 82 % of one speed and energy.
     way = np.linalg.norm(particles.velocity, axis=1).mean() * sim.time_step

@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import brentq
 
 from particlesim.core import parallel as crew
-from particlesim.core.constants import MAX_SUBSTEP_DISPLACEMENT
-from particlesim.model.touching import deepest_overlap
+from particlesim.dynamics.settings import MAX_SUBSTEP_DISPLACEMENT
+from particlesim.model.overlap import deepest_overlap
 from particlesim.simulation.simulation import Simulation
 from tests.brute_force import Spheres
 from tests.gases import spheres
@@ -19,9 +19,9 @@ STEPS = (0.002, 0.02, 0.2)
 
 
 def overlap_of_any(sim):
-    """The largest overlap of any two particles or with a wall [m], whoever the neighbours are held to be."""
-    everyone = np.column_stack(np.triu_indices(len(sim.particles.mass), 1))
-    return deepest_overlap(sim.table, sim.world, sim.constants, sim.state, everyone)
+    """The largest overlap of any two particles or with a wall [m], whatever the neighbour list says."""
+    pairs = np.column_stack(np.triu_indices(len(sim.particles.mass), 1))
+    return deepest_overlap(sim.model.system, pairs)
 
 
 def turned(axis, degrees):
@@ -156,7 +156,7 @@ def test_spheres_do_not_overlap(step):
         sim.step(step)
         assert overlap_of_any(sim) < 1e-9
     assert sim.ledger.impacts > 100
-    assert (np.abs(sim.particles.position) <= sim.world.upper - 0.5 + 1e-9).all()
+    assert (np.abs(sim.particles.position) <= 0.5 * np.array(sim.scene.world.size) - 0.5 + 1e-9).all()
 
 
 @pytest.mark.parametrize("boundary", ["wall", "periodic"])
@@ -302,7 +302,7 @@ def test_a_ball_knocked_far_off_is_followed_while_others_meet_unforeseen():
     resting = [{"position": (3.0 * (k % 60), 3.0 * (k // 60), -40)} for k in range(3000)]
     balls = listed("sphere", *aside, *resting, mass=1.0)
     sim = Simulation(scene(heavy, far, balls, size=(400, 400, 400), boundary="open", step=0.09))
-    assert sim._flight.longest_stretch(MAX_SUBSTEP_DISPLACEMENT) > 0.09
+    assert sim._solver.longest_substep(MAX_SUBSTEP_DISPLACEMENT) > 0.09
     sim.step()
     velocity = sim.particles.velocity
     assert sim.ledger.impacts == 4

@@ -110,7 +110,7 @@ def test_the_virial_theorem_holds_to_rounding():
     before = moment()
     settled(sim, 50, 0.1)
     ledger = sim.ledger
-    inward = (ledger.wall_impulse * (sim.world.upper[0] - 0.5)).sum()
+    inward = (ledger.wall_impulse * (sim.model.system.domain[0]["upper"][0] - 0.5)).sum()
     assert ledger.impacts > 5000
     assert moment() - before == pytest.approx(2.0 * ledger.kinetic * sim.time + ledger.virial - inward, rel=1e-9)
 
@@ -163,7 +163,7 @@ def test_kinds_of_particles_come_to_one_temperature():
     samples, seen = 20, []
     settled(sim, 150, 0.01)
     for _ in range(samples):
-        settled(sim, 15, 0.01)
+        settled(sim, 45, 0.01)
         p = sim.particles
         each = 0.5 * p.mass * (p.velocity**2).sum(axis=1)
         seen.append(np.bincount(p.shape, each) / sim.ledger.kinetic)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from particlesim.core import jit
-from particlesim.core.jit import kernel, without_refcounts
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 
 
 class Things(NamedTuple):
@@ -28,7 +28,7 @@ def _sum_of_part(things, first, last):
     return total
 
 
-@kernel
+@entry_kernel
 def _sum_and_count(things, counted):
     things, counted = without_refcounts((things, counted))
     total = 0.0

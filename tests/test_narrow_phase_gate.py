@@ -69,6 +69,16 @@ def test_what_makes_no_sense_is_refused(shape, pose, message):
         ps.separation("sphere", ((5.0, 0.0, 0.0),), shape, pose)
 
 
+def test_a_half_space_is_the_second_shape():
+    wall, turn = shapes.half_space(), (np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5))  # its normal becomes +y
+    found = ps.separation("sphere", ((5.0, 2.0, 0.0),), wall, ((0.0, 1.0, 0.0), turn))
+    assert found.distance == pytest.approx(0.5, rel=1e-15)
+    np.testing.assert_allclose(found.normal, (0.0, -1.0, 0.0), atol=1e-15)
+    np.testing.assert_allclose(found.points, [(5.0, 1.5, 0.0)], atol=1e-15)
+    with pytest.raises(ValueError, match="a half-space may be the second shape only"):
+        ps.separation(wall, ((0, 0, 0),), "sphere", ((0, 0, 0),))
+
+
 def test_the_pose_of_a_mesh_is_that_of_its_file(tmp_path):
     """A wedge whose principal axes are not those of the file: vertices turned and moved by hand give the answer."""
     random = np.random.default_rng(1)

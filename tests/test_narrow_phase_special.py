@@ -7,43 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import particlesim as ps
-from particlesim.core.constants import MAX_MANIFOLD
+from particlesim.core.constants import MAX_MANIFOLD, POLYHEDRON
 from particlesim.geometry import shapes
 from tests import oracles
 from tests.oracles import direction, unit_quaternion
-
-UPRIGHT = (1.0, 0.0, 0.0, 0.0)
-# A world that is not aligned with the axes, so that nothing is exact by luck.
-TILTS = (UPRIGHT, tuple(unit_quaternion(np.random.default_rng(1))), tuple(unit_quaternion(np.random.default_rng(2))))
-GAPS = (0.0, 1e-3, -1e-3, 1e-9, -1e-9, 1e-12, -1e-12)
-
-
-def about(axis, degrees):
-    """The quaternion of a rotation about an axis."""
-    rotation = Rotation.from_rotvec(np.radians(degrees) * np.asarray(axis) / np.linalg.norm(axis))
-    return np.roll(rotation.as_quat(), 1)
-
-
-def sorted_rows(points):
-    return np.array(sorted(np.round(points, 7).tolist())) + 0.0
-
-
-def meet(shape_a, shape_b, offset, turn_a=UPRIGHT, turn_b=UPRIGHT, size_b=1.0, tilt=UPRIGHT):
-    """The separation with everything tilted, and seen in axes that are tilted too; a stands at the origin."""
-    found = ps.separation(
-        shape_a,
-        ((0.0, 0.0, 0.0), oracles.product(tilt, turn_a)),
-        shape_b,
-        (oracles.turned(tilt, offset), oracles.product(tilt, turn_b), size_b),
-    )
-    back = oracles.rotation(tilt).T
-    return found.distance, back @ found.normal, found.points @ back.T
-
-
-def check(found, distance, normal, points, uncertain=1e-12):
-    assert found[0] == pytest.approx(distance, abs=1e-14)
-    np.testing.assert_allclose(found[1], normal, atol=uncertain)
-    np.testing.assert_allclose(sorted_rows(found[2]), sorted_rows(np.asarray(points, dtype=float)), atol=1e-7)
+from tests.positions import GAPS, TILTS, UPRIGHT, about, check, meet
 
 
 @pytest.mark.parametrize("tilt", TILTS)
@@ -168,11 +136,12 @@ def test_identical_shapes_in_the_same_place():
             # The depth is the least width over all directions: for a body in its own place, between two supports.
             axes = direction(random), found.normal
             vertices = oracles.corners(shape, 1.0, oracles.product(turn, shape.orientation))
-            widths = [np.ptp(vertices @ axis) for axis in axes] if len(vertices) else [1.0, 1.0]
+            widths = [np.ptp(vertices @ axis) + 2.0 * shape.rounding for axis in axes]
             assert -found.distance == pytest.approx(widths[1], abs=1e-13 * shape.radius), name
             assert -found.distance <= widths[0] + 1e-13
-            if len(vertices) and len(vertices) < 30:
+            if shape.kind == POLYHEDRON and len(vertices) < 30:
                 expected = oracles.difference_distance(vertices, vertices)
+                expected -= 2.0 * shape.rounding
                 assert found.distance == pytest.approx(expected, abs=1e-13 * shape.radius), name
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from particlesim.rendering.shading.ambient_occlusion import Sky
-from particlesim.rendering.shading.floor import Ground
+from particlesim.rendering.shading.ambient_occlusion import AmbientOcclusion
+from particlesim.rendering.shading.floor import FloorOcclusion
 
 HALF = np.array([3.0, 2.0])
 FLOOR = -1.0
@@ -19,7 +19,7 @@ def below(position, inner, outer=None):
     """Light on a floor whose squares are a tenth of a metre, (40, 60); rows along y."""
     inner = np.atleast_1d(inner)
     outer = inner if outer is None else np.atleast_1d(outer)
-    light = Ground(HALF, FLOOR, inner, outer).light(np.atleast_2d(position))
+    light = FloorOcclusion(HALF, FLOOR, inner, outer).light(np.atleast_2d(position))
     assert light.dtype == np.float32
     return light
 
@@ -87,8 +87,8 @@ def test_shades_of_many_multiply_and_a_floor_below_nothing_is_light():
     both = below(places, [0.1, 0.1])
     hidden = [(1.0 - below(place, 0.1)) / SHARE for place in places]
     assert both == pytest.approx(1.0 - SHARE * (1.0 - (1.0 - hidden[0]) * (1.0 - hidden[1])), abs=1e-5)
-    nobody = Ground(HALF, FLOOR, np.zeros(0), np.zeros(0)).light(np.zeros((0, 3)))
-    assert nobody.shape == (128, 192) and (nobody == 1.0).all()
+    empty_floor = FloorOcclusion(HALF, FLOOR, np.zeros(0), np.zeros(0)).light(np.zeros((0, 3)))
+    assert empty_floor.shape == (128, 192) and (empty_floor == 1.0).all()
 
 
 # ---- amidst others ------------------------------------------------------------------------------------------------
@@ -102,7 +102,7 @@ def heap(count=3000, seed=2):
 def test_one_alone_gets_all_the_light():
     random = np.random.default_rng(3)
     for radius, least in ((0.02, 0.95), (0.06, 0.8), (0.5, 0.8)):
-        sky = Sky(WORLD, np.array([radius]))
+        sky = AmbientOcclusion(WORLD, np.array([radius]))
         light = [sky.light(random.uniform(-0.9, 0.9, (1, 3)), np.array([0]))[0] for _ in range(40)]
         assert least < min(light) and max(light) <= 1.0
         assert np.mean(light) > 0.5 * (1.0 + least)  # darker only in the middle of a cell
@@ -110,7 +110,7 @@ def test_one_alone_gets_all_the_light():
 
 def test_the_middle_of_a_crowd_gets_less_than_its_top():
     position, outer = heap(1000)
-    light = Sky(WORLD, outer).light(position, np.arange(1000))
+    light = AmbientOcclusion(WORLD, outer).light(position, np.arange(1000))
     assert ((light >= 0.35) & (light <= 1.0)).all()
     top, middle = position[:, 2] > 0.85, (np.abs(position) < 0.4).all(axis=1)
     bottom = (position[:, 2] < -0.8) & (np.abs(position[:, :2]) < 0.4).all(axis=1)
@@ -119,13 +119,14 @@ def test_the_middle_of_a_crowd_gets_less_than_its_top():
     assert light[bottom].mean() < light[middle].mean()
     # Of some only that light is asked for.
     some = np.array([7, 2, 900])
-    assert Sky(WORLD, outer).light(position, some).tolist() == light[some].tolist()
+    assert AmbientOcclusion(WORLD, outer).light(position, some).tolist() == light[some].tolist()
 
 
 def test_fewer_particles_leave_more_light():
     position, outer = heap()
     light = [
-        Sky(WORLD, outer[:count]).light(position[:count], np.arange(100)).mean() for count in (100, 300, 1000, 3000)
+        AmbientOcclusion(WORLD, outer[:count]).light(position[:count], np.arange(100)).mean()
+        for count in (100, 300, 1000, 3000)
     ]
     assert (np.diff(light) < 0.0).all()
 
@@ -134,19 +135,19 @@ def test_fewer_particles_leave_more_light():
 def test_light_does_not_jump_as_all_move_on(way):
     # Over three cells, by a twentieth of one at a time; what leaves the world goes on.
     position, outer = heap()
-    cell, members = 0.12, np.arange(0, 3000, 10)
-    sky = Sky(WORLD, outer)
-    light = np.array([sky.light(position + step * 0.05 * cell * np.array(way), members) for step in range(60)])
+    cell, indices = 0.12, np.arange(0, 3000, 10)
+    sky = AmbientOcclusion(WORLD, outer)
+    light = np.array([sky.light(position + step * 0.05 * cell * np.array(way), indices) for step in range(60)])
     assert np.abs(np.diff(light, axis=0)).max() < 0.05
     # Apart from the cells' own coarseness it is the same all the way, away from where particles left.
-    inside = (np.abs(position[members]) < 0.5).all(axis=1)
+    inside = (np.abs(position[indices]) < 0.5).all(axis=1)
     assert np.ptp(light[:, inside], axis=0).mean() < 0.05
 
 
 @pytest.mark.parametrize("axis", [0, 2])
 def test_one_that_leaves_the_crowd_comes_gently_into_the_light(axis):
     position, outer = heap()
-    sky = Sky(WORLD, outer)
+    sky = AmbientOcclusion(WORLD, outer)
     light = []
     for x in np.linspace(-0.8, -1.4, 120):
         position[0] = 0.0
@@ -160,10 +161,10 @@ def test_light_does_not_depend_on_the_order_of_particles():
     position, outer = heap(500)
     outer = np.random.default_rng(4).uniform(0.02, 0.2, 500)
     order = np.random.default_rng(5).permutation(500)
-    one = Sky(WORLD, outer).light(position, np.arange(500))
-    other = Sky(WORLD, outer[order]).light(position[order], np.arange(500))
+    one = AmbientOcclusion(WORLD, outer).light(position, np.arange(500))
+    other = AmbientOcclusion(WORLD, outer[order]).light(position[order], np.arange(500))
     assert other == pytest.approx(one[order], rel=1e-12)
 
 
 def test_an_empty_sky_is_asked():
-    assert Sky(WORLD, np.zeros(0)).light(np.zeros((0, 3)), np.zeros(0, dtype=np.int64)).shape == (0,)
+    assert AmbientOcclusion(WORLD, np.zeros(0)).light(np.zeros((0, 3)), np.zeros(0, dtype=np.int64)).shape == (0,)

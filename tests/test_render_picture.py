@@ -177,6 +177,21 @@ def test_impostor_and_fine_mesh_have_the_same_outline():
     assert different.sum() < 0.25 * edge(exact).sum()
 
 
+@pytest.mark.parametrize(
+    "shape",
+    [shapes.capsule(1e-4), shapes.hull("grain", 1e-4 * shapes.cube().vertices, rounding=0.5)],
+    ids=["capsule", "polyhedron"],
+)
+def test_a_rounded_shape_of_hardly_any_core_is_shaded_as_a_sphere(shape):
+    frame = make_frame([(2.0, 1.2, -0.7)], [[0.5, 0.5, -0.1, 0.7]])
+    scene = make_scene("#c08020", world={"boundary": "wall"})
+    ball, rounded = (draw(scene, [kind], [2.4], frame).astype(int) for kind in (shapes.sphere(), shape))
+    # Along their outlines pixels differ by what is covered of them.
+    differ = np.abs(ball - rounded).max(axis=2)
+    assert (differ <= 1).mean() > 0.995
+    assert (differ[~(edge(seen((2.0, 1.2, -0.7), 1.2)))] <= 3).mean() > 0.999
+
+
 def test_lit_faces_have_no_shadow_of_their_own():
     turn = np.array([[0.8, 0.1, 0.5, 0.3]])
     turn /= np.linalg.norm(turn)
@@ -239,7 +254,8 @@ def test_a_world_without_particles_in_sight_is_background():
 
 
 def test_all_shapes_of_the_catalogue_are_drawn():
-    kinds = [make() for name, make in shapes.CATALOGUE.items() if name != "mesh"]
+    arguments = {"capsule": {"length": 1.0}}
+    kinds = [make(**arguments.get(name, {})) for name, make in shapes.CATALOGUE.items() if name != "mesh"]
     assert any(kind.kind == SPHERE for kind in kinds)
     scene = make_scene(*["by_shape"] * len(kinds))
     places = [(0.0, y, 0.0) for y in np.linspace(-3.4, 3.4, len(kinds))]

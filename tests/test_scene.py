@@ -10,7 +10,7 @@ from pydantic import ValidationError
 import particlesim as ps
 from particlesim.scene import Scene
 from particlesim.scene.file import parse_scene
-from particlesim.scene.groups import FixedSize, FixedVelocity, Group, PlainShape
+from particlesim.scene.groups import FixedSize, FixedVelocity, Group, PolyhedronShape
 from particlesim.scene.world import Grid, Solver, World
 
 SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))
@@ -39,7 +39,7 @@ colour_range = [0, 3]
 
 [[particles]]
 name = "two"
-shape = { kind = "box", edges = [1, 2, 3] }
+shape = { kind = "box", edges = [1, 2, 3], rounding = 0.25 }
 size = { kind = "log-uniform", low = 0.1, high = 0.3 }
 mass = 2
 restitution = 0.5
@@ -92,7 +92,7 @@ def test_shorthands_stand_for_tables():
     group = {"shape": "cube", "count": 1, "size": 0.2, "velocity": [1, 0, 0], "spin": "rest", "placement": "lattice"}
     scene = Scene(world=table, particles=[group], solver={"broad_phase": "grid"}, camera="orbit")
     assert scene.world.boundary == ("periodic",) * 3
-    assert scene.particles[0].shape == PlainShape(kind="cube")
+    assert scene.particles[0].shape == PolyhedronShape(kind="cube")
     assert scene.particles[0].size == FixedSize(kind="fixed", value=0.2)
     assert scene.particles[0].velocity == FixedVelocity(kind="fixed", vector=(1.0, 0.0, 0.0))
     assert (scene.particles[0].placement.kind, scene.camera.kind) == ("lattice", "orbit")
@@ -105,7 +105,7 @@ def test_a_scene_from_a_file_equals_one_from_python(tmp_path):
     of_dicts = ps.Scene(world={"size": (1, 1, 1)}, particles=[{"shape": "cube", "count": 2, "size": 0.2}])
     size = FixedSize(kind="fixed", value=0.2)
     of_models = ps.Scene(
-        world=World(size=(1.0, 1.0, 1.0)), particles=[Group(shape=PlainShape(kind="cube"), count=2, size=size)]
+        world=World(size=(1.0, 1.0, 1.0)), particles=[Group(shape=PolyhedronShape(kind="cube"), count=2, size=size)]
     )
     of_arrays = ps.Scene(
         world={"size": np.ones(3)}, particles=[{"shape": "cube", "count": np.int64(2), "size": np.float64(0.2)}]
@@ -118,6 +118,19 @@ def test_a_scene_from_a_file_equals_one_from_python(tmp_path):
 def test_scenes_survive_the_way_through_json(path):
     scene = ps.load_scene(path)
     assert Scene.model_validate_json(scene.model_dump_json()) == scene
+
+
+def test_capsules_and_roundings_are_read(everything):
+    assert ps.load_scene(everything).particles[1].shape.rounding == 0.25
+    groups = [
+        {"shape": shape, "count": 1}
+        for shape in ({"kind": "capsule", "length": 2}, {"kind": "tetrahedron", "rounding": 0.5}, "cube", "pyramid")
+    ]
+    capsule, tetrahedron, cube, pyramid = (
+        g.shape for g in ps.Scene(world={"size": (9, 9, 9)}, particles=groups).particles
+    )
+    assert (capsule.kind, capsule.length) == ("capsule", 2.0)
+    assert [shape.rounding for shape in (tetrahedron, cube, pyramid)] == [0.5, 0.0, 0.0]
 
 
 def test_everything_survives_the_way_through_json(everything):

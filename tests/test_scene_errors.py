@@ -84,6 +84,27 @@ BROKEN = [
     (group(shape=None), "particles[0]: the key 'shape' is missing"),
     (group(count=None), "particles[0]: the key 'count' is missing"),
     (group(shape='"box"'), "particles[0].shape = \"box\": the key 'edges' is missing"),
+    (group(shape='"capsule"'), "particles[0].shape = \"capsule\": the key 'length' is missing"),
+    (
+        group(shape='{ kind = "capsule", length = 0 }'),
+        "particles[0].shape.length = 0: must be a number above 0",
+    ),
+    (
+        group(shape='{ kind = "cube", rounding = -0.1 }'),
+        "particles[0].shape.rounding = -0.1: must be a number of 0 or more",
+    ),
+    (
+        group(shape='{ kind = "pyramid", rounding = true }'),
+        "particles[0].shape.rounding = true: must be a number of 0 or more",
+    ),
+    (
+        group(shape='{ kind = "sphere", rounding = 0.1 }'),
+        "particles[0].shape.rounding = 0.1: unknown key; allowed: kind",
+    ),
+    (
+        group(shape='{ kind = "capsule", rounding = 0.1, length = 1 }'),
+        "particles[0].shape.rounding = 0.1: unknown key; allowed: kind, length",
+    ),
     (WORLD + GROUP.replace("particles", "particle"), "particle: unknown key; did you mean 'particles'?"),
     (
         WORLD + GROUP.replace("[[particles]]", "[particles]"),
@@ -99,7 +120,7 @@ BROKEN = [
     (
         group(shape="{ edges = [1, 2, 3] }"),
         "particles[0].shape: the key 'kind' is missing; "
-        "allowed: 'sphere', 'cube', 'tetrahedron', 'box', 'pyramid' or 'mesh'",
+        "allowed: 'sphere', 'capsule', 'cube', 'tetrahedron', 'box', 'pyramid' or 'mesh'",
     ),
     (
         group(shape="3"),

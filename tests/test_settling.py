@@ -5,35 +5,37 @@ import pytest
 
 from particlesim.core.constants import MAX_MANIFOLD
 from particlesim.core.math3d import quat_to_matrix
-from particlesim.dynamics.contact.contact_points import COLUMNS, LEVER_I, handed_down
+from particlesim.dynamics.contact.contact_points import CONTACT_POINT, handed_down
+from particlesim.dynamics.solver_state import FORCE
 from particlesim.geometry import shapes
-from particlesim.geometry.narrow_phase.contact_manifold import hull_patch
+from particlesim.geometry.narrow_phase.contact_manifold import contact_manifold
 from particlesim.geometry.shape_table import stack_shapes
 from particlesim.simulation.simulation import Simulation
+from tests.kernels import callable_from_python
 from tests.worlds import listed, scene
+
+call_contact_manifold = callable_from_python(contact_manifold)
+call_quat_to_matrix = callable_from_python(quat_to_matrix)
 
 GRAVITY = (0.0, 0.0, -9.81)
 SHAPES = ("sphere", "cube", "pyramid")
 
 
 def followed(what, duration, pieces):
-    """The simulation after ``duration``, and the ledgers at the start and after each of so many pieces of it."""
+    """The simulation after ``duration``, the ledgers at the start and after each piece, and the largest overlap."""
     sim = Simulation(what)
-    ledgers = [sim.frame().ledger]
+    ledgers, overlaps = [sim.ledger], [sim.largest_overlap()]
     for _ in range(pieces):
         sim.run(duration=duration / pieces)
-        ledgers.append(sim.frame().ledger)
-    return sim, ledgers
+        ledgers.append(sim.ledger)
+        overlaps.append(sim.largest_overlap())
+    return sim, ledgers, max(overlaps)
 
 
 def only_falls(ledgers):
     """Whether no energy is gained, but for what is left where the impulses are no longer made better (settling.py)."""
     energies = np.array([ledger.energy for ledger in ledgers])
     return (np.diff(energies) <= 1e-11 * energies[0]).all()
-
-
-def largest_overlap(ledgers):
-    return max(ledger.largest_overlap for ledger in ledgers)
 
 
 def momentum_unaccounted(sim, ledgers):
@@ -55,9 +57,9 @@ def heap(count, *, seed=1, size=(0.8, 0.8, 2.0), **settings):
 def test_a_tower_of_cubes_stands(restitution):
     poses = [{"position": (0, 0, -4.4 + 1.05 * k)} for k in range(6)]
     tower = scene(listed("cube", *poses), size=(10, 10, 10), gravity=GRAVITY, restitution=restitution)
-    sim, ledgers = followed(tower, 2, 20)
+    sim, ledgers, overlap = followed(tower, 2, 20)
     assert only_falls(ledgers)
-    assert largest_overlap(ledgers) < 1e-4
+    assert overlap < 1e-4
     assert sim.ledger.kinetic < 1e-6 * ledgers[0].energy
     assert np.allclose(sim.particles.position[:, 2], -4.5 + np.arange(6), rtol=0, atol=1e-3)
     assert momentum_unaccounted(sim, ledgers) < 1e-12
@@ -69,7 +71,7 @@ def test_cubes_laid_as_bricks_carry_each_other():
         {"position": (1.1 * (k - 0.5 * (2 - level)), 0, -4.5 + level)} for level in range(3) for k in range(3 - level)
     ]
     wall = scene(listed("cube", *poses), size=(10, 10, 10), gravity=GRAVITY, restitution=0.5)
-    sim, ledgers = followed(wall, 1, 5)
+    sim, ledgers, _ = followed(wall, 1, 5)
     start = np.array([pose["position"] for pose in poses])
     assert only_falls(ledgers)
     assert np.allclose(sim.particles.position, start, rtol=0, atol=1e-6)
@@ -79,40 +81,43 @@ def test_cubes_laid_as_bricks_carry_each_other():
 def test_what_lands_without_rebound_is_not_lifted_again():
     dropped = {"position": (0, 0, 0.2), "orientation": {"axis": (1, 2, 0.5), "angle": 40}}
     for shape in SHAPES:
-        sim, ledgers = followed(scene(listed(shape, dropped), size=(4, 4, 4), gravity=GRAVITY, restitution=0.0), 4, 40)
+        sim, ledgers, overlap = followed(
+            scene(listed(shape, dropped), size=(4, 4, 4), gravity=GRAVITY, restitution=0.0), 4, 40
+        )
         assert only_falls(ledgers)
-        assert largest_overlap(ledgers) < 1e-4
+        assert overlap < 1e-4
         assert sim.ledger.kinetic < 1e-12 * ledgers[0].energy
         assert momentum_unaccounted(sim, ledgers) < 1e-12
 
 
 def test_a_heap_of_all_shapes_calms_down():
-    sim, ledgers = followed(heap(10), 3, 30)
+    sim, ledgers, overlap = followed(heap(10), 3, 30)
     assert only_falls(ledgers)
     assert sim.ledger.kinetic < 0.02 * max(ledger.kinetic for ledger in ledgers)
-    assert largest_overlap(ledgers) < 1e-4 * 0.2
+    assert overlap < 1e-4 * 0.2
     assert momentum_unaccounted(sim, ledgers) < 1e-12
 
 
 def test_a_heap_thrown_together_is_worked_through():
     """Nothing sinks into anything, at whatever moment one looks; the bound on the work is reached in few of them."""
-    sim, ledgers = followed(heap(6, size=(0.6, 0.6, 2.0)), 2, 1600)
+    sim, ledgers, overlap = followed(heap(6, size=(0.6, 0.6, 2.0)), 2, 1600)
     assert only_falls(ledgers)
-    assert largest_overlap(ledgers) < 1e-4 * 0.2
+    assert overlap < 1e-4 * 0.2
     assert sim.ledger.unresolved < 0.01 * sim.steps
 
 
 def test_forces_go_to_the_nearest_points_of_the_same_contact():
     """The corners of a patch come in any order, and may be fewer or more than before; no force is lost."""
-    point = np.zeros((4, COLUMNS))
-    point[:, LEVER_I] = 5.0, 1.0, 2.0, 1.1
+    point = np.zeros(4, dtype=CONTACT_POINT)
+    point["lever_a"][:, 0] = 5.0, 1.0, 2.0, 1.1
     contact, before = np.array([7, 3, 3, 9]), np.array([3, 3, 3, 8, 7])
-    lever = np.zeros((5, 3))
-    lever[:, 0] = 2.1, 1.2, 0.8, 5.0, -4.0
+    memory = np.zeros(5, dtype=FORCE)
+    memory["lever"][:, 0] = 2.1, 1.2, 0.8, 5.0, -4.0
+    memory["force"] = 10.0, 20.0, 30.0, 40.0, 50.0
     order = np.argsort(contact, kind="stable")
     first = np.searchsorted(contact, before, sorter=order)
     last = np.searchsorted(contact, before, side="right", sorter=order)
-    forces = handed_down(point, order, first, last, lever, np.array([10.0, 20.0, 30.0, 40.0, 50.0]))
+    forces = handed_down(point, order, first, last, memory)
     assert forces.tolist() == [50.0, 50.0, 10.0, 0.0]
 
 
@@ -130,7 +135,7 @@ def test_a_ball_keeps_its_speed_along_what_it_rests_on():
     """There is no friction: what slides on the floor, and on a body that lies there, goes on sliding."""
     slab = listed({"kind": "box", "edges": [4.0, 4.0, 0.5]}, {"position": (0, 0, -1.75)})
     ball = listed("sphere", {"position": (-1, 0, -1.25), "velocity": (0.5, 0, 0)}, size=0.5)
-    sim, ledgers = followed(scene(slab, ball, size=(4, 4, 4), gravity=GRAVITY, restitution=0.5), 2, 10)
+    sim, ledgers, _ = followed(scene(slab, ball, size=(4, 4, 4), gravity=GRAVITY, restitution=0.5), 2, 10)
     assert only_falls(ledgers)
     assert np.allclose(sim.particles.velocity[1], (0.5, 0, 0), rtol=0, atol=1e-6)
     assert sim.particles.position[1, 0] == pytest.approx(0.0, abs=1e-6)
@@ -140,15 +145,14 @@ def test_a_ball_keeps_its_speed_along_what_it_rests_on():
 def test_an_inclined_face_over_another_comes_nowhere_nearer_than_it_is(first):
     """A cube that leans over the flat top of another: the nearest of its points is one of its own, not beyond them."""
     lean, lift = np.array([np.cos(0.05), 0.0, np.sin(0.05), 0.0]), 1e-3
-    matrices = [(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), quat_to_matrix(tuple(lean))]
-    lowest = float(np.min(shapes.cube().vertices @ np.reshape(matrices[1], (3, 3))[2]))
+    orientations = [(1.0, 0.0, 0.0, 0.0), tuple((lean / np.linalg.norm(lean)).tolist())]
+    lowest = float(np.min(shapes.cube().vertices @ np.reshape(call_quat_to_matrix(orientations[1]), (3, 3))[2]))
     offset, normal = np.array([-0.2, 0.0, 0.5 + lift - lowest]), np.array([0.0, 0.0, 1.0])
     if first:
-        matrices, offset, normal = matrices[::-1], -offset, -normal
+        orientations, offset, normal = orientations[::-1], -offset, -normal
     points, gaps = np.empty((MAX_MANIFOLD, 3)), np.empty(MAX_MANIFOLD)
-    count = hull_patch(
-        stack_shapes([shapes.cube()]), 0, 1.0, matrices[0], 0, 1.0, matrices[1],
-        tuple(offset), tuple(normal), lift, (0.0, 0.0, 0.0), 0.2, 0.02, points, gaps,
-    )  # fmt: skip
+    a, b = ((0, 1.0, orientation) for orientation in orientations)
+    contact = tuple(offset.tolist()), tuple(normal.tolist()), lift, (0.0, 0.0, 0.0)
+    count = call_contact_manifold(stack_shapes([shapes.cube()]), a, b, contact, (0.2, 0.02), points, gaps)
     assert count == 4
     assert gaps[:count].min() == pytest.approx(lift, abs=1e-12)

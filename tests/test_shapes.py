@@ -8,17 +8,19 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 import particlesim as ps
-from particlesim.core.constants import HULL, SPHERE
+from particlesim.core.constants import POLYHEDRON, SPHERE
+from particlesim.core.polyhedra import POLYHEDRA
 from particlesim.geometry import shapes
 from particlesim.geometry.mass_properties import mass_properties, principal_axes
 from particlesim.geometry.shape_table import stack_shapes
+from particlesim.geometry.tolerances import MAX_MESH_VERTICES
 from tests import oracles
 
 
 def every_shape(folder):
     """All of the catalogue, and the odd shapes of the other tests."""
     trimesh.creation.torus(1.0, 0.4, major_sections=9, minor_sections=7).export(folder / "torus.stl")
-    needs = {"mesh": {"file": folder / "torus.stl"}}
+    needs = {"mesh": {"file": folder / "torus.stl"}, "capsule": {"length": 2.0}}
     catalogue = {name: make(**needs.get(name, {})) for name, make in shapes.CATALOGUE.items()}
     return {**oracles.zoo(), **catalogue}
 
@@ -29,7 +31,12 @@ def catalogue(tmp_path_factory):
 
 
 def solids(catalogue):
-    return [(name, shape) for name, shape in catalogue.items() if shape.kind == HULL]
+    """The polyhedra that are not rounded."""
+    return [(name, shape) for name, shape in catalogue.items() if shape.kind == POLYHEDRON and not shape.rounding]
+
+
+def cores(catalogue):
+    return [(name, shape) for name, shape in catalogue.items() if shape.kind == POLYHEDRON]
 
 
 def as_trimesh(shape):
@@ -37,7 +44,7 @@ def as_trimesh(shape):
 
 
 def test_hulls_are_closed_and_obey_euler(catalogue):
-    for name, shape in solids(catalogue):
+    for name, shape in cores(catalogue):
         edges = shape.edges
         assert len(shape.vertices) - len(edges) + len(shape.faces) == 2, name
         assert 2 * len(edges) == sum(len(loop) for loop in shape.faces), name
@@ -50,7 +57,7 @@ def test_hulls_are_closed_and_obey_euler(catalogue):
 
 
 def test_faces_are_plane_convex_and_counter_clockwise(catalogue):
-    for name, shape in solids(catalogue):
+    for name, shape in cores(catalogue):
         for loop, normal in zip(shape.faces, shape.face_normals, strict=True):
             corners = shape.vertices[list(loop)]
             heights = shape.vertices @ normal - corners[0] @ normal
@@ -64,9 +71,9 @@ def test_faces_are_plane_convex_and_counter_clockwise(catalogue):
 
 
 def test_bounding_and_inscribed_spheres(catalogue):
-    for name, shape in solids(catalogue):
-        assert shape.radius == np.linalg.norm(shape.vertices, axis=1).max(), name
-        inscribed = -oracles.hull_distance(np.zeros(3), shape, 1.0, (1.0, 0.0, 0.0, 0.0), np.zeros(3))
+    for name, shape in catalogue.items():
+        assert shape.radius == np.linalg.norm(shape.vertices, axis=1).max() + shape.rounding, name
+        inscribed = -oracles.surface_distance(np.zeros(3), shape, 1.0, (1.0, 0.0, 0.0, 0.0), np.zeros(3))
         assert shape.inradius == pytest.approx(inscribed, rel=1e-12), name
     assert catalogue["sphere"].radius == catalogue["sphere"].inradius == 0.5
 
@@ -128,6 +135,17 @@ def test_mass_properties_do_not_depend_on_the_origin():
     assert there.volume == pytest.approx(here.volume, rel=1e-11)
     np.testing.assert_allclose(there.centroid, (300.0, -200.0, 100.0), atol=1e-11)
     np.testing.assert_allclose(there.inertia, here.inertia, atol=1e-11)
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-5, 2e-6])
+def test_the_small_moment_of_a_needle_keeps_its_digits(width):
+    needle = shapes.box((1.0, width, width))
+    expected = np.array([2.0 * width**2, 1.0 + width**2, 1.0 + width**2]) * width**2 / 12.0
+    np.testing.assert_allclose(needle.moments, expected, rtol=1e-13)
+    # Turned, its corners are rounded by 1e-16, which is a fraction of the width.
+    turn = Rotation.random(rng=np.random.default_rng(1))
+    turned = shapes.hull("turned", turn.apply(needle.vertices))
+    np.testing.assert_allclose(np.sort(turned.moments), expected, rtol=1e-14 / width)
 
 
 def test_principal_axes_are_a_rotation():
@@ -192,6 +210,45 @@ def test_what_encloses_no_volume_is_refused(vertices):
         shapes.hull("bad", vertices)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("count", [4, 5, 8, 30])
+def test_nearly_flat_points_are_a_shape_or_refused_in_one_line(count):
+    random = np.random.default_rng(6)
+    outcomes = {True: 0, False: 0}
+    clouds = [np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 1e-9)])]
+    for _ in range(100):
+        points = random.normal(size=(count, 3)) * (1.0, 1.0, 10.0 ** random.uniform(-17.0, -3.0))
+        tilted = Rotation.random(rng=random).apply(points)
+        clouds += [tilted, np.float32(tilted)]
+    for cloud in clouds:
+        try:
+            shape = shapes.hull("flat", cloud)
+        except ValueError as error:
+            assert str(error) == "the vertices of 'flat' enclose no volume"
+            outcomes[False] += 1
+        else:
+            assert min(shape.volume, shape.inradius, *shape.moments) > 0.0
+            outcomes[True] += 1
+    assert min(outcomes.values()) > 20
+
+
+@pytest.mark.parametrize("ending", ["obj", "stl"])
+@pytest.mark.parametrize("steps", [15, 32])
+def test_a_mesh_with_many_points_on_its_faces_keeps_its_shape(tmp_path, ending, steps):
+    """A cube, turned, with a grid of points on each face: in a file's digits no more than a cube."""
+    line = np.linspace(-0.5, 0.5, steps + 1)
+    grid = np.stack(np.meshgrid(line, line, [-0.5, 0.5], indexing="ij"), axis=-1).reshape(-1, 3)
+    points = np.unique(np.concatenate([np.roll(grid, k, axis=1) for k in range(3)]), axis=0)
+    # Any triangles will do: what matters is which points the file has.
+    corners = trimesh.Trimesh(points, np.arange(3 * len(points)).reshape(-1, 3) % len(points), process=False)
+    corners.apply_transform(trimesh.transformations.rotation_matrix(1.0, (1.0, 2.0, 3.0)))
+    corners.export(tmp_path / f"cube.{ending}")
+    shape = shapes.mesh(tmp_path / f"cube.{ending}")
+    assert (len(shape.vertices), len(shape.faces)) == (8, 6)
+    assert shape.volume == pytest.approx(1.0, rel=1e-6)
+    np.testing.assert_allclose(shape.moments, 1.0 / 6.0, rtol=1e-6)
+
+
 @pytest.mark.parametrize("ending", ["stl", "obj", "ply"])
 def test_a_mesh_file_gives_its_convex_hull(tmp_path, ending):
     solid = trimesh.creation.torus(1.0, 0.4, major_sections=12, minor_sections=6)
@@ -199,7 +256,7 @@ def test_a_mesh_file_gives_its_convex_hull(tmp_path, ending):
     solid.export(file)
     shape = shapes.mesh(file)
     hull = solid.convex_hull
-    assert shape.name == "ring" and shape.kind == HULL
+    assert shape.name == "ring" and shape.kind == POLYHEDRON
     assert shape.volume == pytest.approx(hull.volume, rel=1e-5) and shape.volume > solid.volume
     np.testing.assert_allclose(np.sort(shape.moments), np.sort(hull.principal_inertia_components), rtol=1e-5)
     assert np.abs(shape.orientation).max() > 0.0 and ps.CATALOGUE["mesh"](file).volume == shape.volume
@@ -210,7 +267,7 @@ def test_a_fine_mesh_is_thinned_and_stays_inside(tmp_path):
     solid.export(tmp_path / "ball.stl")
     shape = shapes.mesh(tmp_path / "ball.stl")
     assert len(solid.vertices) > 10_000
-    assert shapes.MAX_MESH_VERTICES * 0.9 < len(shape.vertices) <= shapes.MAX_MESH_VERTICES
+    assert MAX_MESH_VERTICES * 0.9 < len(shape.vertices) <= MAX_MESH_VERTICES
     assert shape.radius <= 2.05 and shape.inradius > 1.7
     assert shape.volume > 0.85 * solid.volume
 
@@ -230,6 +287,14 @@ def test_bad_files(tmp_path):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(ValueError, match=name.split(".")[0]):
             shapes.mesh(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", POLYHEDRA)
+def test_a_polyhedron_is_one_entry_for_catalogue_and_scenes(name):
+    assert shapes.CATALOGUE[name]().name == name
+    scene = ps.Scene(world={"size": (9, 9, 9)}, particles=[{"shape": name, "count": 1}])
+    assert scene.particles[0].shape.kind == name
+    assert name in ps.Scene.model_json_schema()["$defs"]["PolyhedronShape"]["properties"]["kind"]["enum"]
 
 
 def test_adding_a_shape_is_one_entry(monkeypatch):

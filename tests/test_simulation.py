@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from particlesim.core.constants import STEP_FRACTION
+from particlesim.dynamics.settings import STEP_DISPLACEMENT
 from particlesim.simulation.simulation import Simulation, SimulationError
 from tests.worlds import gas, listed, scene
 
@@ -73,7 +73,7 @@ def test_surfaces_move_by_a_fraction_of_the_radii_in_an_automatic_step():
         step = sim.next_time_step()
         paced = np.sqrt(np.mean((surface / particles.radius) ** 2)) * step
         fallen = np.mean(0.5 * 9.81 * step**2 / particles.radius)
-        assert paced + fallen == pytest.approx(STEP_FRACTION, rel=1e-9)
+        assert paced + fallen == pytest.approx(STEP_DISPLACEMENT, rel=1e-9)
         sim.step()
 
 

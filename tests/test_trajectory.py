@@ -34,9 +34,9 @@ def test_what_is_written_is_read(run):
         header = trajectory.header
         assert header.scene_json == sim.header.scene_json
         assert [shape.name for shape in header.shapes] == ["sphere", "cube", "pyramid", "box"]
-        assert all(np.allclose(a.vertices, b.vertices) for a, b in zip(header.shapes, sim.shapes, strict=True))
-        assert np.array_equal(header.size, sim.constants.size)
-        assert np.array_equal(header.group, sim.constants.group)
+        assert all(np.allclose(a.vertices, b.vertices) for a, b in zip(header.shapes, sim.model.shapes, strict=True))
+        assert np.array_equal(header.size, sim.particles.size)
+        assert np.array_equal(header.group, sim.particles.group)
         for read, written in zip(trajectory, frames, strict=True):
             assert read.time == written.time
             for name in ("position", "orientation", "velocity", "angular_momentum"):
@@ -59,7 +59,7 @@ def test_other_programs_find_the_hoomd_schema(run):
     assert shapes[5]["type"] == "ConvexPolyhedron"
     assert np.allclose(np.abs(shapes[5]["vertices"]), 0.15)
     assert particles.diameter[[0, 5]].tolist() == pytest.approx([0.3, 2.0])
-    assert np.allclose(particles.mass, sim.constants.mass, rtol=1e-6)
+    assert np.allclose(particles.mass, sim.particles.mass, rtol=1e-6)
     # HOOMD's angular momentum is 2 q (0, L_body).
     q, p = particles.orientation[7], particles.angmom[7]
     body = Rotation.from_quat(np.roll(q, -1)).inv().apply(frames[3].angular_momentum[7])
@@ -76,7 +76,7 @@ def test_many_sizes_become_a_bounded_number_of_types(tmp_path):
     with gsd.hoomd.open(str(tmp_path / "run.gsd")) as file:
         assert len(file[0].particles.types) == 64
     with Trajectory(tmp_path / "run.gsd") as trajectory:
-        assert np.array_equal(trajectory.header.size, sim.constants.size)
+        assert np.array_equal(trajectory.header.size, sim.particles.size)
 
 
 def test_a_file_appears_whole_or_not_at_all(tmp_path):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.broad_phase.aabb_test import SLACK, Aabbs
-from particlesim.core.jit import kernel
+from particlesim.core.jit import entry_kernel, kernel
 from particlesim.core.parallel import ThreadTeam
+from particlesim.core.records import record
 
 # The typical place and size are taken from this many AABBs, picked by multiples of a prime modulo their number:
 # a pattern in the order of the particles does not matter.
@@ -21,7 +22,7 @@ _TAIL = 2
 _BLOCK = 512
 
 
-STATISTICS = np.dtype(
+STATISTICS = record(
     [
         ("region_lower", "f8", (3,)),  # most centres lie in the region; on a periodic axis it is 0 .. period [m]
         ("region_upper", "f8", (3,)),  # [m]
@@ -30,8 +31,7 @@ STATISTICS = np.dtype(
         ("longest", "f8"),  # the longest edge of any AABB [m]
         ("typical", "f8"),  # the median of the longest edges, by the sample [m]
         ("scale", "f8"),  # one over the longest edge of the region [1/m]; 0 for a point
-    ],
-    align=True,
+    ]
 )
 
 
@@ -44,7 +44,7 @@ def wrapped_centre(lower, upper, period):
     return centre
 
 
-@kernel
+@entry_kernel
 def _extremes(first, last, aabbs, result):
     """Rows of ``result`` (4, 3): -smallest and largest centre, largest width, largest absolute coordinate.
 
@@ -121,7 +121,7 @@ def _region_along(low, high, period, sample):
     return low, high
 
 
-@kernel
+@entry_kernel
 def _summarise(aabbs, parts, statistics):
     """The statistics from the extremes of each thread's part (see ``_extremes``)."""
     result = statistics[0]

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from particlesim.core.jit import kernel
+from particlesim.core.jit import entry_kernel
 from particlesim.core.parallel import ThreadTeam
 
 
-@kernel
+@entry_kernel
 def _count(first, last, keys, shift, counts):
     for slot in range(first, last):
         counts[np.uint64(keys[slot] >> shift)] += 1
 
 
-@kernel
+@entry_kernel
 def _scan(counts, starts):
     """Counts (threads, buckets) become the places where each thread's part of each bucket starts."""
     total = 0
@@ -27,7 +27,7 @@ def _scan(counts, starts):
     starts[counts.shape[1]] = total
 
 
-@kernel
+@entry_kernel
 def _place(first, last, keys, order, shift, cursors, keys_out, order_out):
     for slot in range(first, last):
         bucket = np.uint64(keys[slot] >> shift)

@@ -17,7 +17,7 @@ from particlesim.broad_phase.aabb_test import BATCH, Aabbs, StoredAabbs, append_
 from particlesim.broad_phase.counting_sort import counting_sort
 from particlesim.broad_phase.grid_layout import buckets_of_aabb, fill_keys, lay_out
 from particlesim.broad_phase.pair_sort import sort_pairs
-from particlesim.core.jit import kernel
+from particlesim.core.jit import entry_kernel, kernel
 from particlesim.core.parallel import ThreadTeam
 
 # Ranges of candidates that are listed before they are tested, or as many as one AABB has: 192 kB.
@@ -74,7 +74,7 @@ def _fill_band(band, keyed, numbers, aabbs, cells):
         bounds[slot, 5] = upper[index, 2]
 
 
-@kernel
+@entry_kernel
 def _fill_bands(first, last, shift, places, keyed, numbers, aabbs, cells):
     """Sort bands ``first .. last`` of 2**shift buckets each, which start at ``places``."""
     total = cells.start.size - 1
@@ -189,7 +189,7 @@ def _append_ranges(ranges, number, candidates, stored, keys, found):
     return append_overlaps(candidates, np.int64(size), stored, keys, found), tested
 
 
-@kernel
+@entry_kernel
 def _search_cells(first, last, grids, cells, keys):
     """Pairs of AABBs in the cells, the earlier of which lies in ``first .. last``: (found, tested)."""
     grid = grids[0]
@@ -224,7 +224,7 @@ def _add_row(index, row, left, number, length, starts, ranges, size):
     return size + 2
 
 
-@kernel
+@entry_kernel
 def _search_large(first, last, grids, cells, keys):
     """Pairs of AABBs ``first .. last``, which are too large for the cells, with those in the cells."""
     grid = grids[0]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.broad_phase.aabb_statistics import wrapped_centre
-from particlesim.core.jit import kernel
+from particlesim.core.jit import entry_kernel, kernel
+from particlesim.core.records import record
 
 # Buckets for each AABB where the cells are chosen.  Cells as wide as the AABBs are about 2.5 for each at a fill of
 # 0.2.  Where the AABBs are further apart there are more, and cells share buckets.
@@ -26,7 +27,7 @@ _MOST_ALONG = 2.0**26
 _CELL_SLACK = 1e-7
 
 # The grid, axis by axis.  Cells whose numbers differ by a multiple of ``buckets`` share a bucket.
-GRID = np.dtype(
+GRID = record(
     [
         ("cells", "i8", (3,)),
         ("buckets", "i8", (3,)),  # that AABBs are counted into
@@ -37,8 +38,7 @@ GRID = np.dtype(
         ("per_metre", "f8", (3,)),  # cells
         ("width", "f8", (3,)),  # of the widest AABB in the cells, rounding included [m]
         ("limit", "f8"),  # AABBs with a longer edge are not in the cells [m]
-    ],
-    align=True,
+    ]
 )
 
 
@@ -91,7 +91,7 @@ def _set_reach(extent, grid):
         grid.reach[axis] = min(reach, grid.buckets[axis] - 1)
 
 
-@kernel
+@entry_kernel
 def _lay_out(statistics, period, count, given, grids):
     grid, known = grids[0], statistics[0]
     grid.limit = MARGIN * known.typical if known.longest > LARGE * known.typical else known.longest
@@ -139,7 +139,7 @@ def _bucket_of(lower, upper, along):
     return cell % np.uint64(buckets) if buckets < cells else cell
 
 
-@kernel
+@entry_kernel
 def fill_keys(first, last, aabbs, grids, keys, order):
     """``keys``: the bucket of each AABB's centre, x fastest, or one past the last for an AABB above the limit."""
     lower, upper, _ = aabbs

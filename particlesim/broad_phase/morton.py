@@ -11,7 +11,7 @@ import numpy as np
 
 from particlesim.broad_phase.aabb_statistics import wrapped_centre
 from particlesim.broad_phase.aabb_test import Aabbs
-from particlesim.core.jit import kernel
+from particlesim.core.jit import entry_kernel, kernel
 from particlesim.core.math3d import to_vec3
 from particlesim.core.parallel import ThreadTeam
 
@@ -58,7 +58,7 @@ def _size_class(width, widest):
     return found
 
 
-@kernel
+@entry_kernel
 def _fill_codes(first, last, aabbs, statistics, codes):
     """Codes of AABBs ``first .. last`` in the root cube, which is as wide as the region of most centres."""
     lower, upper, period = aabbs
@@ -83,7 +83,7 @@ def codes_of(aabbs: Aabbs, statistics: np.ndarray, team: ThreadTeam) -> np.ndarr
     return codes
 
 
-@kernel
+@entry_kernel
 def fill_octants(points, lower, inverse, codes):
     """Codes of ``points`` (n, 3) in a cuboid at ``lower`` (3,) of edges 1 / ``inverse`` (3,)."""
     for index in range(points.shape[0]):

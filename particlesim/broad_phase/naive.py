@@ -7,14 +7,14 @@ import numpy as np
 from particlesim.broad_phase.aabb_test import BATCH, StoredAabbs, append_overlaps, collect
 from particlesim.broad_phase.pair_sort import sort_pairs
 from particlesim.broad_phase.soa_aabb import LANES, load_soa, lowest, overlap_bits
-from particlesim.core.jit import kernel
+from particlesim.core.jit import entry_kernel
 from particlesim.core.parallel import ThreadTeam
 
 # AABBs that are tested against a whole range before the next is taken: 24 kB, which stay in the fastest cache.
 TILE = 1024
 
 
-@kernel
+@entry_kernel
 def _search(first, last, soa, stored, keys):
     """All pairs whose smaller number lies in ``first .. last``: (found, tested)."""
     count = stored.order.size

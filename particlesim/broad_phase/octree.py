@@ -18,7 +18,7 @@ from particlesim.broad_phase.morton import LEVELS, codes_of
 from particlesim.broad_phase.octree_build import build, fit, in_order, sort_by_code
 from particlesim.broad_phase.pair_sort import sort_pairs
 from particlesim.broad_phase.soa_aabb import LANES, child_bits, load_soa, lowest, may_overlap, overlap_bits
-from particlesim.core.jit import kernel, without_refcounts
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import to_vec3
 from particlesim.core.parallel import ThreadTeam
 
@@ -168,7 +168,7 @@ def _test_list(span, near, image, soa, stored, candidates, keys, progress):
     return size, found, tested
 
 
-@kernel
+@entry_kernel
 def _search(first, last, tree, images, keys):
     """Pairs within the leaves ``first .. last`` and between them and the leaves before them: (found, tested)."""
     nodes, node_soa, leaves, soa, stored = without_refcounts(tree)
@@ -208,7 +208,7 @@ def _search(first, last, tree, images, keys):
     return append_overlaps(candidates, waiting, stored, keys, found), tested
 
 
-@kernel
+@entry_kernel
 def _write_images(period, statistics, shifts, margin):
     """Shifts to all images that can be nearest, none first, and the margin; how many shifts."""
     scale = statistics[0].scale

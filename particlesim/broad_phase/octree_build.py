@@ -9,11 +9,12 @@ from particlesim.broad_phase.aabb_test import Aabbs, StoredAabbs
 from particlesim.broad_phase.counting_sort import counting_sort
 from particlesim.broad_phase.morton import CLASS_SHIFT, CODE_BITS, LEVELS
 from particlesim.broad_phase.soa_aabb import LANES
-from particlesim.core.jit import kernel
+from particlesim.core.jit import entry_kernel, kernel
 from particlesim.core.parallel import ALONE, ThreadTeam
+from particlesim.core.records import record
 
 # A node of the octree.  Node 0 is the root; children stand after their parents.
-NODE = np.dtype(
+NODE = record(
     [
         ("start", "i4"),  # range of AABBs
         ("stop", "i4"),
@@ -61,7 +62,7 @@ def _sort_range(start, stop, shift, bits, coded, spare, ends):
         order[slot] = spare_order[slot]
 
 
-@kernel
+@entry_kernel
 def _sort_deeper(first, last, starts, limits, coded, spare):
     """Sort ranges ``first .. last`` of ``starts``, equal above ``shift``, until they are short or equal to ``lowest``.
 
@@ -150,7 +151,7 @@ def _end_of_digit(codes, start, stop, shift):
     return low
 
 
-@kernel
+@entry_kernel
 def _build(codes, max_count, max_depth, nodes, leaves):
     """Write nodes and leaves; how many of each."""
     nodes[0].start = 0
@@ -197,7 +198,7 @@ def build(codes: np.ndarray, max_count: int, max_depth: int) -> tuple[np.ndarray
     return nodes[:size], leaves[:found]
 
 
-@kernel
+@entry_kernel
 def _fill_in_order(first, last, aabbs, statistics, stored, soa):
     lower, upper, period = aabbs
     bounds, order, _ = stored
@@ -233,7 +234,7 @@ def in_order(
     return stored, soa
 
 
-@kernel
+@entry_kernel
 def _fit_leaves(first, last, nodes, soa, node_soa):
     for node in range(first, last):
         if nodes[node].children == 0:
@@ -249,7 +250,7 @@ def _fit_leaves(first, last, nodes, soa, node_soa):
                 node_soa[axis + 3, node] = high
 
 
-@kernel
+@entry_kernel
 def _fit_parents(nodes, node_soa):
     """From the last node to the root: children stand after their parents."""
     for node in range(nodes.shape[0] - 1, -1, -1):

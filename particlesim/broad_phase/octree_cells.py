@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from particlesim.broad_phase.morton import LEVELS, fill_octants
-from particlesim.core.jit import kernel
+from particlesim.core.jit import entry_kernel
 
 # A node taken from the stack puts back at most its eight children, at each of the levels.
 _STACK = 8 * (LEVELS + 1)
 
 
-@kernel
+@entry_kernel
 def _fill_leaves(codes, max_count, max_depth, leaves):
     """Rows (depth, x, y, z) in cells of that depth, as many as ``leaves`` (k, 4) holds; the number there are."""
     stack = np.empty((_STACK, 6), dtype=np.int64)  # range of codes, depth, x, y, z

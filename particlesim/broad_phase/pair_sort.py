@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from particlesim.core.jit import kernel
+from particlesim.core.jit import entry_kernel, kernel
 from particlesim.core.parallel import ThreadTeam
 
 # Rows in a band, 2**BAND at first: the counters of a band, 32 kB, stay in the fastest cache.  Bands are made wider
@@ -22,13 +22,13 @@ _LONG_ROW = 24
 _LOW_HALF = 0xFFFFFFFF
 
 
-@kernel
+@entry_kernel
 def _count_bands(keys, shift, counts):
     for slot in range(keys.size):
         counts[np.uint64(keys[slot]) >> np.uint64(shift)] += 1
 
 
-@kernel
+@entry_kernel
 def _fill_bands(keys, shift, cursors, sorted_keys):
     for slot in range(keys.size):
         band = np.uint64(keys[slot]) >> np.uint64(shift)
@@ -80,7 +80,7 @@ def _compact(pairs):
     return size
 
 
-@kernel
+@entry_kernel
 def _write_band(keys, first_row, rows, unique, pairs):
     """Keys whose i is in ``first_row .. first_row + rows`` to the front of ``pairs``; how many there are.
 

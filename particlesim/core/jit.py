@@ -1,4 +1,4 @@
-"""The one decorator under which every kernel is compiled, and the cache in which the result is kept.
+"""The two decorators under which kernels are compiled, and the cache in which the result is kept.
 
 Numba's on-disk cache notices a change in the file of a kernel but not in the files of the kernels that it calls. The
 cache folder of a module is therefore named after a digest of its source and of all that it imports: a stale kernel
@@ -66,7 +66,7 @@ def _cache_folder() -> str:
 def _private_folder(folder: Path) -> Path:
     """``folder`` if none but this user can write to it, made if it is not there; else a new one.
 
-    Its name can be foreseen, and what is in it is run: anybody could have put it there.
+    Its name can be foreseen, and what is in it is run: any user could have put it there.
     """
     try:
         folder.mkdir(mode=0o700)
@@ -85,28 +85,51 @@ def is_compiled(module: str) -> bool:
     return any(Path(CACHE_FOLDER, _digest(module)).rglob("*.nbi"))
 
 
-def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False) -> Any:
-    """Compile ``function`` for the machine: cached on disk, without the GIL, IEEE arithmetic (no fastmath).
+_njit: Any = numba.njit
 
-    ``inline=True`` writes it into its callers.  It is for what runs once an item and takes the structs of arrays:
-    handing these over counts references to some thirty arrays, which takes longer than moving a particle.
-    """
-    if function is None:
-        return lambda wrapped: kernel(wrapped, inline=inline)
+
+def _compiled(function: Callable[..., Any], **options: Any) -> Any:
+    """Compile ``function`` for the machine: cached on disk, without the GIL, IEEE arithmetic (no fastmath)."""
     # The place of a function's cache is settled when it is decorated; other users of numba keep theirs.
     config: Any = numba.config
     elsewhere = config.CACHE_DIR
     ours = function.__module__.startswith("particlesim.")
     config.CACHE_DIR = os.path.join(CACHE_FOLDER, _digest(function.__module__.removeprefix("particlesim.")))
     try:
-        options: dict[str, Any] = {"inline": "always" if inline else "never", "error_model": "numpy"}
-        return numba.njit(cache=ours, nogil=True, **options)(function)
+        compiled = _njit(cache=ours, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
     finally:
         config.CACHE_DIR = elsewhere
+    if not config.DISABLE_JIT:
+        _compile_once_a_role(compiled)
+    return compiled
+
+
+def _role(kind: Any) -> Any:
+    """The one type of all arguments that differ in nothing that matters: constants and short integers among them."""
+    plain: Any = types.unliteral(kind)
+    widest: Any = types.intp
+    short = isinstance(kind, types.Integer) and plain.signed and plain.bitwidth < widest.bitwidth
+    return widest if short else plain
+
+
+def _compile_once_a_role(dispatcher: Any) -> None:
+    """Keep numba from compiling a function anew for each constant that it is called with."""
+    compile_as_typed = dispatcher.compile
+    dispatcher.compile = lambda signature: compile_as_typed(tuple(_role(kind) for kind in signature))
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function that only kernels call. Called from Python it crashes: it has no wrapper, which takes long."""
+    return _compiled(function, no_cpython_wrapper=True)
+
+
+def entry_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function that Python calls; kernels may call it too."""
+    return _compiled(function)
 
 
 class _Uncounted(types.Array):
-    """The type of an array that somebody else holds: references to it, or to parts of it, are not counted."""
+    """The type of an array that is held elsewhere: references to it, or to parts of it, are not counted."""
 
     def __init__(self, array: types.Array) -> None:
         name = f"uncounted {array.name}"
@@ -131,6 +154,8 @@ class _UncountedModel(models.StructModel):
 
 def _uncounted_type(kind: Any) -> Any:
     """The type of an array, or of a tuple with arrays in it, that is not counted."""
+    if isinstance(kind, _Uncounted):
+        return kind
     if isinstance(kind, types.Array):
         return _Uncounted(kind)
     if isinstance(kind, types.BaseTuple):
@@ -142,6 +167,8 @@ def _uncounted_type(kind: Any) -> Any:
 
 def _uncounted(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     """The value, of type ``kind``, as its uncounted type has it."""
+    if isinstance(kind, _Uncounted):
+        return value
     if isinstance(kind, types.Array):
         array, bare = make_array(kind)(context, builder, value=value), make_array(_Uncounted(kind))(context, builder)
         for name in ("nitems", "itemsize", "data", "shape", "strides"):

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from particlesim.core.jit import kernel
+from particlesim.core.jit import entry_kernel, kernel
 
 
 @kernel
@@ -21,6 +21,24 @@ def load_vec3(array, index):
 def to_vec3(array):
     """A (3,) array as a vector."""
     return array[0], array[1], array[2]
+
+
+@kernel
+def to_quat(array):
+    """A (4,) array as a quaternion."""
+    return array[0], array[1], array[2], array[3]
+
+
+@kernel
+def set_vec3(array, v):
+    """Write vector ``v`` into a (3,) array."""
+    array[0], array[1], array[2] = v[0], v[1], v[2]
+
+
+@kernel
+def set_quat(array, q):
+    """Write quaternion ``q`` into a (4,) array."""
+    array[0], array[1], array[2], array[3] = q[0], q[1], q[2], q[3]
 
 
 @kernel
@@ -53,6 +71,14 @@ def grow(array):
     for k in range(array.shape[0]):
         for column in range(array.shape[1]):
             longer[k, column] = array[k, column]
+    return longer
+
+
+@kernel
+def grow_records(array):
+    """An array (n,) of records with those of this one and room for as many again."""
+    longer = np.empty(2 * len(array), dtype=array.dtype)
+    longer[: len(array)] = array
     return longer
 
 
@@ -98,7 +124,7 @@ def norm(a):
     return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
-@kernel
+@entry_kernel
 def quat_multiply(p, q):
     """The rotation q followed by the rotation p."""
     return (
@@ -115,7 +141,7 @@ def conjugate(q):
     return q[0], -q[1], -q[2], -q[3]
 
 
-@kernel
+@entry_kernel
 def quat_normalize(q):
     """q divided by its length."""
     s = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])

@@ -1,5 +1,1 @@
-"""Impacts at their true time: who meets whom, when, and what becomes of it."""
-
-from particlesim.dynamics.solver import Flight
-
-__all__ = ["Flight"]
+"""Impacts at their true time: which bodies collide, when, and what becomes of it; and what rests."""

@@ -1,92 +1,124 @@
-"""What concerns every particle in every stretch of time, whether it meets anything or not."""
+"""Advance: every body along its free path to the end of the substep; and how fast all of them are."""
 
 from __future__ import annotations
 
 import math
 
-from particlesim.core.jit import kernel, without_refcounts
-from particlesim.core.math3d import dot, load_quat, load_vec3, norm, store_quat, store_vec3, sub, to_vec3
-from particlesim.geometry.narrow_phase.pair import nearest_image
-from particlesim.model.free_motion import free_path, spin_rate
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
+from particlesim.core.math3d import axpy, dot, norm, set_quat, set_vec3, sub, to_quat, to_vec3
+from particlesim.dynamics.ccd.swept_bounds import largest_acceleration
+from particlesim.model.domain import nearest_image
+from particlesim.model.free_motion import angular_speed, free_acceleration, free_rotation, isotropic_rotation
 
 
 @kernel
 def _turns_round(position, lower, period):
     """How often a coordinate has gone round a periodic axis; 0 on any other."""
-    inside = 0.0 <= position - lower < period  # of most, who are spared the division
+    inside = 0.0 <= position - lower < period  # of most, which are spared the division
     return math.floor((position - lower) / period) if period > 0.0 and not inside else 0
 
 
 @kernel
-def fly_on(constants, state, world, clock, acceleration, anchor, leash, duration, first, last):
-    """Bring particles ``first .. last`` from their clocks to ``duration`` [s] along their free paths.
-
-    Particles that leave a periodic world come back on the other side. Returns for how long [s] all of them certainly
-    stay on their leashes, going straight on; -1 if one is not on its leash now.
-    """
-    constants, state, world = without_refcounts((constants, state, world))
-    clock, acceleration, anchor, leash = without_refcounts((clock, acceleration, anchor, leash))
-    position, orientation, velocity = state.position, state.orientation, state.velocity
-    momentum, image, inertia = state.angular_momentum, state.image, constants.inertia
-    corner, period = world.lower, world.period
-    gravity = norm(to_vec3(world.gravity))
-    longest = math.inf
-    for i in range(first, last):
-        pull = load_vec3(acceleration, i)
-        x, q, v = free_path(
-            load_vec3(position, i),
-            load_quat(orientation, i),
-            load_vec3(velocity, i),
-            load_vec3(momentum, i),
-            load_vec3(inertia, i),
-            pull,
-            duration - clock[i],
+def _wrapped(b, position, domain):
+    """A position brought back into a periodic domain; counts in the body's image how often it went round."""
+    lower, period = domain.lower, domain.period
+    turns = (
+        _turns_round(position[0], lower[0], period[0]),
+        _turns_round(position[1], lower[1], period[1]),
+        _turns_round(position[2], lower[2], period[2]),
+    )
+    if turns != (0, 0, 0):
+        for axis in range(3):
+            b.image[axis] += turns[axis]
+        position = (
+            position[0] - period[0] * turns[0],
+            position[1] - period[1] * turns[1],
+            position[2] - period[2] * turns[2],
         )
-        turns = (
-            _turns_round(x[0], corner[0], period[0]),
-            _turns_round(x[1], corner[1], period[1]),
-            _turns_round(x[2], corner[2], period[2]),
-        )
-        if turns != (0, 0, 0):
-            for axis in range(3):
-                image[i, axis] += turns[axis]
-            x = x[0] - period[0] * turns[0], x[1] - period[1] * turns[1], x[2] - period[2] * turns[2]
-        store_vec3(position, i, x)
-        store_quat(orientation, i, q)
-        store_vec3(velocity, i, v)
-        room = leash[i] - norm(nearest_image(sub(x, load_vec3(anchor, i)), period))
-        if room < 0.0:
-            longest = -1.0
-        else:
-            # room = speed t + pull t^2 / 2
-            speed = norm(v)
-            denominator = speed + math.sqrt(speed * speed + 2.0 * max(gravity, norm(pull)) * room)
-            if denominator > 0.0:
-                longest = min(longest, 2.0 * room / denominator)
-    return longest
+    return position
 
 
 @kernel
-def paces(constants, state, world, out, rows, first, last):
-    """Sums over blocks ``first .. last`` of ``rows`` particles: squares of paces of surfaces, and gravity, in radii.
+def _fly(b, acceleration, time):
+    """Let a particle fly freely for ``time`` [s] from where its record has it."""
+    position, velocity, momentum = to_vec3(b.position), to_vec3(b.velocity), to_vec3(b.angular_momentum)
+    set_vec3(b.position, axpy(axpy(position, velocity, time), acceleration, 0.5 * time * time))
+    set_vec3(b.velocity, axpy(velocity, acceleration, time))
+    if dot(momentum, momentum) > 0.0:
+        orientation, isotropic = to_quat(b.orientation), b.isotropic_inertia
+        if isotropic > 0.0:
+            orientation = isotropic_rotation(orientation, momentum, isotropic, time)
+        else:
+            orientation = free_rotation(orientation, momentum, to_vec3(b.principal_inertia), time)
+        set_quat(b.orientation, orientation)
 
-    ``out`` (blocks, 2) [1/s^2], [1/s^2]. Returns the largest speed [m/s].
+
+@kernel
+def _time_within_skin(position, speed, acceleration, reference, period):
+    """For how long [s] a body certainly stays within its skin, going straight on; -1 if it is not within it now."""
+    offset = nearest_image(sub(position, (reference[0], reference[1], reference[2])), period)
+    room = reference[3] - norm(offset)
+    if room < 0.0:
+        return -1.0
+    # room = speed t + acceleration t^2 / 2
+    denominator = speed + math.sqrt(speed * speed + 2.0 * acceleration * room)
+    return 2.0 * room / denominator if denominator > 0.0 else math.inf
+
+
+@entry_kernel
+def advance(system, reference, duration, first, last):
+    """Bring particles ``first .. last`` from their local clocks to ``duration`` [s] along their free paths.
+
+    Those that leave a periodic domain come back on the other side. Returns for how long [s] all of them certainly stay
+    within their skins, going straight on; -1 if one has left it.
     """
-    velocity, orientation, momentum, inertia, radius = without_refcounts(
-        (state.velocity, state.orientation, state.angular_momentum, constants.inertia, constants.radius)
-    )
-    g = norm(to_vec3(world.gravity))
+    system, reference = without_refcounts((system, reference))
+    domain = system.domain[0]
+    gravity = norm(to_vec3(domain.gravity))
+    longest = math.inf
+    for i in range(first, last):
+        b = system.body[i]
+        _fly(b, free_acceleration(system, b), duration - b.time if b.disturbed != 0 else duration)
+        position = _wrapped(b, to_vec3(b.position), domain)
+        set_vec3(b.position, position)
+        speed = norm(to_vec3(b.velocity))
+        longest = min(longest, _time_within_skin(position, speed, gravity, reference[i], domain.period))
+    return longest
+
+
+@entry_kernel
+def time_within_skins(system, reference, first, last):
+    """As ``advance`` returns, of bodies ``first .. last`` as they are now."""
+    system, reference = without_refcounts((system, reference))
+    longest = math.inf
+    for i in range(first, last):
+        b = system.body[i]
+        speed, acceleration = norm(to_vec3(b.velocity)), largest_acceleration(system, b)
+        period = system.domain[0].period
+        longest = min(longest, _time_within_skin(to_vec3(b.position), speed, acceleration, reference[i], period))
+    return longest
+
+
+@entry_kernel
+def sum_speeds(system, block_size, sums, first, last):
+    """Sums over blocks ``first .. last`` of particles: squares of surface speeds, and gravity, in radii.
+
+    ``sums`` (blocks, 2) [1/s^2], [1/s^2]. Returns the largest speed [m/s].
+    """
+    system, sums = without_refcounts((system, sums))
+    gravity = norm(to_vec3(system.domain[0].gravity))
     fastest = 0.0
     for block in range(first, last):
-        pace = pull = 0.0
-        for i in range(block * rows, min((block + 1) * rows, len(radius))):
-            speed2 = dot(load_vec3(velocity, i), load_vec3(velocity, i))
-            own = load_vec3(momentum, i)
+        squares = falls = 0.0
+        for i in range(block * block_size, min((block + 1) * block_size, system.particles)):
+            b = system.body[i]
+            speed2 = dot(to_vec3(b.velocity), to_vec3(b.velocity))
             fastest = max(fastest, speed2)
             speed = math.sqrt(speed2)
-            if dot(own, own) > 0.0:
-                speed += spin_rate(load_quat(orientation, i), own, load_vec3(inertia, i)) * radius[i]
-            pace += (speed / radius[i]) ** 2
-            pull += g / radius[i]
-        out[block, 0], out[block, 1] = pace, pull
+            momentum = to_vec3(b.angular_momentum)
+            if dot(momentum, momentum) > 0.0:
+                speed += angular_speed(b) * b.radius
+            squares += (speed / b.radius) ** 2
+            falls += gravity / b.radius
+        sums[block, 0], sums[block, 1] = squares, falls
     return math.sqrt(fastest)

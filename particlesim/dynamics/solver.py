@@ -1,9 +1,9 @@
-"""Particles on their way: everything that is met in a stretch of time, at the time when it is met.
+"""The solver: one time step is four verbs, and everything that is struck is struck at its time.
 
-First every particle is followed along its free path, and who meets whom is found. Particles that meet are islands,
-each carried through its impacts in the order of time, independently of the others. A deflected particle may then
-meet one of another island after all: such islands are joined and carried through once more from the start. When
-nothing new is met, the result is the one that following all impacts in one order of time would have given, whatever
+First the impacts on the free paths of all bodies are predicted. Particles that collide are islands, each carried
+through its impacts in the order of time, independently of the others. A deflected particle may then collide with one of
+another island after all: such islands are joined and carried through once more from the start. When no collision
+across islands is left, the result is the one that following all impacts in one order of time would have given, whatever
 the order in which the islands were taken and however many threads shared them.
 """
 
@@ -13,116 +13,163 @@ import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 
 import numpy as np
 
-from particlesim.core.constants import (
-    MAX_ISLAND_ROUNDS,
-    MAX_MANIFOLD,
-    MAX_SUBSTEP_BISECTIONS,
-    MAX_SUBSTEP_DISPLACEMENT,
-    SPHERE,
-    WALL,
-)
 from particlesim.core.parallel import ThreadTeam
-from particlesim.dynamics.advance import fly_on, paces
-from particlesim.dynamics.contact.impact import IMPACTS, TALLY, VIRIAL, WALLS
-from particlesim.dynamics.contact.resting import Resting
-from particlesim.dynamics.events.collision_prediction import Where, first_meetings, follow_paths, missed_meetings
+from particlesim.dynamics.advance import advance, sum_speeds, time_within_skins
+from particlesim.dynamics.ccd.swept_bounds import BOUND
+from particlesim.dynamics.contact.impact import ACCUMULATED, IMPACTS, VIRIAL, WALLS
+from particlesim.dynamics.contact.resting import Borne, RestingContacts, forget_clearance
+from particlesim.dynamics.events.collision_prediction import Predicted, bound_paths, predict, predict_across
 from particlesim.dynamics.events.event_queue import run_islands
 from particlesim.dynamics.events.islands import Islands, add_up, newly_touched, unite
-from particlesim.dynamics.events.paths import Log, empty_log, extended, forget, new_course, rewind
-from particlesim.dynamics.neighbour_list import FindPairs, find_neighbours, in_order, leashes, pairs_of, places_of
-from particlesim.geometry.shape_table import ShapeTable
-from particlesim.model.bodies import Constants, State, World
+from particlesim.dynamics.events.paths import Paths, extended, forget, new_clocks, no_segments, rewind
+from particlesim.dynamics.neighbour_list import (
+    FindPairs,
+    NeighbourList,
+    Order,
+    Spheres,
+    find_neighbours,
+    order_of,
+    pairs_of,
+    sort_neighbours,
+    write_skins,
+)
+from particlesim.dynamics.settings import (
+    APPROACH_TOLERANCE,
+    ISLAND_COST,
+    MAX_ISLAND_ROUNDS,
+    MAX_SUBSTEP_BISECTIONS,
+    MAX_SUBSTEP_DISPLACEMENT,
+    PENETRATION_SLOP,
+    PERIODIC_ROOM,
+    RESTING_PENETRATION_SLOP,
+    SEARCHES_PER_SORT,
+    STRAYED_SKIN,
+    SUM_BLOCK,
+)
+from particlesim.dynamics.solver_state import FORCE, SEEN, Counts, SolverState
+from particlesim.model.prescribed_motion import place_kinematic
+from particlesim.model.system import Model, System
 
-# Particles whose paces are summed at a time: sums depend on the order, and must not on the number of threads.
-_ROWS = 4096
-
-
-# Neighbours are looked up so often before particles get new places: they go far slower than that.
-_PLACES_LAST = 16
-
-# To carry an island through its impacts takes as long as other work on so many particles.
-_ISLAND = 32
-
-# What the time goes into: finding neighbours, who meets whom, answering impacts, moving on.
+# What the computing time goes into.
 PHASES = ("pairs", "contacts", "respond", "advance")
 
 
-@dataclass
-class Counts:
-    """What was done since the start."""
+class Solver:
+    """Moves the bodies of a model on, changing their records in place.
 
-    each: np.ndarray  # (n,) int64, impacts of each particle
-    impacts: int = 0
-    virial: float = 0.0  # sum of r_ij . impulse over pair impacts [J s]
-    wall_impulse: np.ndarray = field(default_factory=lambda: np.zeros(6))  # outward, on each wall [N s]
-    pairs_tested: int = 0  # boxes compared by the broad phase
-    candidate_pairs: int = 0  # pairs it found
-    unresolved: int = 0  # stretches of time in which more happened than was worked through (see MAX_IMPACTS)
+    Parameters
+    ----------
+    model : Model
+        The bodies and what they are made of; their records are changed.
+    find_pairs : callable
+        A broad phase: lower and upper corners (n, 3) [m] and periods (3,) [m] to pairs (m, 2) and boxes compared.
+    state : SolverState, optional
+        To go on from; by default that of a start at time 0.
+    """
 
-
-class Flight:
-    """Moves particles on, changing ``state`` in place."""
-
-    def __init__(
-        self, table: ShapeTable, world: World, constants: Constants, state: State, find_pairs: FindPairs
-    ) -> None:
-        count = len(constants.mass)
-        self._table, self._world, self._constants, self._state = table, world, constants, state
+    def __init__(self, model: Model, find_pairs: FindPairs, state: SolverState | None = None) -> None:
         self._find_pairs = find_pairs
-        self._hulls = bool((table.kind[constants.shape] != SPHERE).any())
-        self._course = new_course(count, world.gravity)
-        self._leash = np.empty(count)
-        self._first_met = np.full(count, -1, dtype=np.int64)
-        self._tally = np.zeros((count, TALLY if (world.boundary == WALL).any() else WALLS))
-        self._resting = Resting(table, world, constants, state)
-        self.counts = Counts(np.zeros(count, dtype=np.int64))
+        self.counts = Counts(np.zeros(model.system.particles, dtype=np.int64))
         self.seconds = dict.fromkeys(PHASES, 0.0)
-        self._ball = np.empty((count, 8))  # by place, what each particle cannot leave in the present stretch
-        self._looked = 0  # how often neighbours were looked up
-        self._on_leash = -1.0
-        self._look_around(0.0)
+        self._take(model)
+        self.state = self._begin(0.0) if state is None else state
+
+    def _take(self, model: Model) -> None:
+        """Make room for the bodies of a model."""
+        system = model.system
+        self.model, self._system = model, system
+        _set_tolerances(system)
+        self._resting = RestingContacts(system)
+        self._clock = new_clocks(len(system.body))
+        self._accumulator = np.zeros((system.particles, ACCUMULATED if len(system.body) > system.bounded else WALLS))
+        self._bound = np.zeros(system.bounded, dtype=BOUND)  # scratch, by place
+
+    def change_particles(self, particles: np.ndarray, origin: np.ndarray) -> None:
+        """Let there be other particles from now on.
+
+        Parameters
+        ----------
+        particles : (n,) BODY
+            Their records.
+        origin : (n,) int
+            Which of the particles before each of them was, -1 for new ones.
+        """
+        each = np.where(origin >= 0, np.append(self.counts.each, 0)[origin], 0)
+        self.counts.each = each.astype(np.int64)
+        self._take(self.model.with_particles(particles))
+        self.state = self._begin(self.state.time)
+
+    def _begin(self, now: float) -> SolverState:
+        """The state of a start at a time [s]."""
+        system, body = self._system, self._system.body
+        body["resting"] = body["disturbed"] = body["time"] = 0
+        place_kinematic(body, system.motion, now)
+        # Without gravity nothing rests, and nothing need be remembered of how near bodies are.
+        known = system.bounded if system.domain[0]["gravity"].any() else 0
+        seen = np.zeros(known, dtype=SEEN)
+        for name in SEEN.names or ():
+            seen[name] = body[name][:known]
+        order = order_of(np.ascontiguousarray(body["position"][: system.bounded]), system.domain[0]["period"])
+        skin = np.empty(system.bounded)
+        self._write_skins(skin, 0.0)
+        neighbours = self._search(body["position"], skin, order)
+        state = SolverState(
+            time=now,
+            order=order,
+            searches=1,
+            skin=skin,
+            time_within_skins=-1.0,
+            neighbours=neighbours,
+            standing=np.zeros(len(body), dtype=np.int64),
+            seen=seen,
+            displacement=np.zeros(known),
+            clearance=np.empty(0),
+            forces=np.empty(0, dtype=FORCE),
+            pressed_speed=0.0,
+        )
+        forget_clearance(state, neighbours)
+        return state
 
     @property
     def pairs(self) -> np.ndarray:
-        """Pairs of neighbours (m, 2), i < j: nothing else can touch at present."""
-        return pairs_of(self._neighbours)
+        """Pairs of neighbours (m, 2), i < j: no other bounded bodies can touch at present."""
+        return pairs_of(self.state.neighbours)
 
-    def longest_stretch(self, fraction: float) -> float:
-        """In how long [s] the surfaces move by ``fraction`` of the bounding radius (root mean square); inf if never.
+    def longest_substep(self, displacement: float) -> float:
+        """In how long [s] surfaces move by ``displacement`` of the bounding radius (root mean square); inf if never.
 
-        Where few are fast among many at rest, it is they who meet others. The surface of a particle moves at most
-        (|v| + |w| R) t + g t^2 / 2. On periodic axes nothing goes so far that it could meet another image of a
-        particle than the nearest.
+        Where few are fast among many at rest, it is they that strike others. The surface of a particle moves at most
+        (|v| + |w| R) t + g t^2 / 2. On periodic axes nothing goes so far that it could touch another image of a body
+        than the nearest.
         """
-        count = len(self._constants.mass)
-        if not count:
+        system = self._system
+        if not system.particles:
             return math.inf
-        sums = np.empty((-(-count // _ROWS), 2))
-        of_blocks = ThreadTeam(count).each(
-            lambda _, first, last: paces(self._constants, self._state, self._world, sums, _ROWS, first, last), len(sums)
+        sums = np.empty((-(-system.particles // SUM_BLOCK), 2))
+        of_blocks = ThreadTeam(system.particles).each(
+            lambda _, first, last: sum_speeds(system, SUM_BLOCK, sums, first, last), len(sums)
         )
-        fastest = max(of_blocks)
-        square, pull = sums.sum(axis=0) / count
-        time = _time_for(fraction, math.sqrt(square), pull)
-        time = min(time, self._resting.longest_stretch)
-        around = self._world.period[self._world.period > 0.0]
-        if len(around):
-            # A quarter of the room to the next image of another, for two that close in on it at twice the speed.
-            room = 0.5 * around.min() - 2.0 * self._constants.radius.max()
-            way = max(0.25 * room, 1e-3 * self._constants.radius.min())
-            gravity = float(np.linalg.norm(self._world.gravity))
-            time = min(time, _time_for(way, fastest, gravity))
-        return time
+        squares, falls = sums.sum(axis=0) / system.particles
+        longest = min(_time_for(displacement, math.sqrt(squares), falls), self._resting.longest_substep(self.state))
+        return min(longest, self._periodic_limit(max(of_blocks)))
 
-    def advance(self, duration: float) -> None:
-        """Move all on by ``duration`` [s], in as many equal stretches as that is long."""
-        parts = max(1, math.ceil(duration / self.longest_stretch(MAX_SUBSTEP_DISPLACEMENT) - 1e-9))
+    def _periodic_limit(self, fastest: float) -> float:
+        """In how long [s] two bodies that close in at twice the ``fastest`` speed [m/s] come near another image."""
+        domain, radius = self._system.domain[0], self._system.body["radius"][: self._system.bounded]
+        periods = domain["period"][domain["period"] > 0.0]
+        if not len(periods):
+            return math.inf
+        room = PERIODIC_ROOM * (0.5 * periods.min() - 2.0 * radius.max())
+        return _time_for(max(room, 1e-3 * radius.min()), fastest, float(np.linalg.norm(domain["gravity"])))
+
+    def step(self, duration: float) -> None:
+        """Move all bodies on by ``duration`` [s], in as many equal substeps as that is long."""
+        parts = max(1, math.ceil(duration / self.longest_substep(MAX_SUBSTEP_DISPLACEMENT) - 1e-9))
         for _ in range(parts):
-            self._stretch(duration / parts)
+            self._substep(duration / parts)
 
     @contextmanager
     def _spent_on(self, phase: str) -> Iterator[None]:
@@ -130,154 +177,178 @@ class Flight:
         yield
         self.seconds[phase] += time.perf_counter() - begun
 
-    def _stretch(self, duration: float, halvings: int = 0) -> None:
-        if duration > self._on_leash:
-            with self._spent_on("pairs"):
-                del self._neighbours  # which take as much memory as what it takes to make new ones
-                self._look_around(duration)
-        if not self._follow(duration, halvings == MAX_SUBSTEP_BISECTIONS):
-            # Too much hangs together, or happens: less does in half the time.
-            self._stretch(0.5 * duration, halvings + 1)
-            self._stretch(0.5 * duration, halvings + 1)
+    # ---- the four verbs ----------------------------------------------------------------------------------------------
 
-    def _follow(self, duration: float, anyhow: bool) -> bool:
-        """Move all on by ``duration`` [s]; False, with nothing moved, if that takes too much but not ``anyhow``."""
-        course, state = self._course, self._state
-        log = empty_log()
+    def _substep(self, duration: float, bisections: int = 0) -> None:
+        with self._spent_on("pairs"):
+            self._find_pairs_for(duration)
+        if self._respond(duration, anyhow=bisections == MAX_SUBSTEP_BISECTIONS):
+            with self._spent_on("advance"):
+                self._advance(duration)
+        else:
+            # Too much hangs together, or happens: less does in half the time.
+            self._substep(0.5 * duration, bisections + 1)
+            self._substep(0.5 * duration, bisections + 1)
+
+    def _find_pairs_for(self, duration: float) -> None:
+        """Search neighbours anew if any body may leave its skin within ``duration`` [s]."""
+        state, system = self.state, self._system
+        if duration <= state.time_within_skins:
+            return
+        self._write_skins(state.skin, duration)
+        if state.searches % SEARCHES_PER_SORT == 0:
+            position = np.ascontiguousarray(system.body["position"][: system.bounded])
+            state.order = order_of(position, system.domain[0]["period"])
+        state.searches += 1
+        self._renew_neighbours(system.body["position"])
+
+    def _find_contacts(self, paths: Paths, duration: float) -> Predicted:
+        """The first impacts on the free paths of all bodies."""
+        state = self.state
+        return predict(self._system, paths, state.neighbours, self._bound, state.standing, duration)
+
+    def _respond(self, duration: float, anyhow: bool) -> bool:
+        """Carry all that is struck through its impacts; False, with nothing changed, if it is too much."""
+        system, clock = self._system, self._clock
+        paths = Paths(clock, no_segments())
         with self._spent_on("respond"):
-            self._resting.hold(self._neighbours, course.acceleration, duration)
+            borne = self._resting.carry(self.state, duration)
         with self._spent_on("contacts"):
-            met, times = first_meetings(
-                self._where(log), self._neighbours, self._ball, self._resting.standing, duration
-            )
-            starts = np.flatnonzero(np.diff(met[:, 0], prepend=-1))
-            self._first_met[met[starts, 0]] = starts
-        touched = [newly_touched(course.touched, met)]
-        linked = met
+            predicted = self._find_contacts(paths, duration)
+        touched = [newly_touched(clock, predicted.pair, system.particles)]
+        linked = predicted.pair
         rounds = unfinished = 0
         while len(linked) and (anyhow or (rounds < MAX_ISLAND_ROUNDS and not unfinished)):
             with self._spent_on("respond"):
-                islands = unite(course, linked)
-                rewind(course, log, state, islands.member)
-                self._tally[islands.member[islands.start[:-1]]] = 0.0
-                first_piece = len(log.particle)
-                log, left = self._run(islands, log, met, times, duration)
+                islands = unite(clock, linked, system.particles)
+                rewind(paths, system.body, islands.member)
+                self._accumulator[islands.member[islands.start[:-1]]] = 0.0
+                first_segment = len(paths.segment)
+                paths, left = self._run(islands, paths, predicted, duration)
                 unfinished += left
             with self._spent_on("contacts"):
-                linked = self._missed(log, islands.member, first_piece, duration, again=rounds > 0)
-                touched.append(newly_touched(course.touched, linked))
+                linked = self._predict_across(paths, islands.member, first_segment, duration, again=rounds > 0)
+                touched.append(newly_touched(clock, linked, system.particles))
             rounds += 1
         done = not len(linked) and (anyhow or not unfinished)
-        everyone = np.concatenate(touched)
-        tallied = add_up(self._tally, course.island, everyone)
+        disturbed = np.concatenate(touched)
+        total = add_up(self._accumulator, clock, disturbed)
         if done:
-            self._book(tallied, everyone, unfinished)
-            with self._spent_on("advance"):
-                self._fly_on(duration)
+            self._book(total, disturbed, borne, unfinished)
         else:
-            rewind(course, log, state, everyone)
+            rewind(paths, system.body, disturbed)
             self._resting.release()
-        self._first_met[met[starts, 0]] = -1
-        forget(course, everyone)
+            forget(clock, system.body, disturbed)
+        self._disturbed = disturbed
         return done
 
-    def _where(self, log: Log) -> Where:
-        return self._table, self._world, self._constants, self._state, self._course, log
-
-    def _run(self, islands: Islands, log: Log, met: np.ndarray, times: np.ndarray, duration: float) -> tuple[Log, int]:
-        """Carry islands through their impacts; the log with the paths, and how many islands were left unfinished."""
-        where = self._where(log)[:-1]
-        neighbours, count = self._neighbours, len(islands.start) - 1
-        meetings = met, times, self._first_met, islands.start, islands.member
-        crew = ThreadTeam(_ISLAND * count)
-        parts = crew.each(
-            lambda _, first, last: run_islands(
-                *where, neighbours.lists, *meetings, duration, self._tally, np.empty((MAX_MANIFOLD, 3)), first, last
-            ),
-            count,
-            4 * crew.threads,
+    def _advance(self, duration: float) -> None:
+        """Bring every body to the end of the substep."""
+        state, system = self.state, self._system
+        state.time += duration
+        times = ThreadTeam(system.particles).each(
+            lambda _, first, last: advance(system, state.neighbours.reference, duration, first, last),
+            system.particles,
         )
-        log = extended(self._course, log, [piece for piece, _, _ in parts], [whose for _, whose, _ in parts])
-        return log, sum(left for _, _, left in parts)
+        place_kinematic(system.body, system.motion, state.time)
+        times.append(time_within_skins(system, state.neighbours.reference, system.particles, system.bounded))
+        state.time_within_skins = min(times)
+        forget(self._clock, system.body, self._disturbed)
 
-    def _missed(self, log: Log, members: np.ndarray, first_piece: int, duration: float, again: bool) -> np.ndarray:
-        """Pairs (m, 2) of different islands that meet after all, of those whose pieces of path start there.
+    # ---- neighbours --------------------------------------------------------------------------------------------------
 
-        They are among the ``members`` of the islands that have just been carried through. Where that was done
-        ``again``, some of them may be deflected no more, and meet others on the paths that they are on instead.
-        """
-        course, where = self._course, self._where(log)
-        whom = members if again else members[course.head[members] >= 0]
-        if not follow_paths(where, self._neighbours, self._ball, members, duration):
-            # Longer leashes for those that went astray: nobody goes farther than at his greatest speed all the time.
-            speed = np.linalg.norm(log.piece[:, 8:11], axis=1) + np.linalg.norm(self._world.gravity) * duration
-            np.maximum.at(self._leash, log.particle, 1.1 * speed * duration)
-            position = self._state.position.copy()
-            deflected = np.flatnonzero(course.head >= 0)
-            position[deflected] = log.piece[course.head[deflected], 1:4]
-            whom = np.union1d(deflected, members)
-            del self._neighbours
-            self._meet_neighbours(position)
-            first_piece = 0
-        return missed_meetings(where, self._neighbours, self._ball, whom, first_piece, duration)
+    def _write_skins(self, skin: np.ndarray, duration: float) -> None:
+        system = self._system
+        ThreadTeam(len(skin)).each(lambda _, first, last: write_skins(system, duration, skin, first, last), len(skin))
 
-    def _book(self, total: np.ndarray, touched: np.ndarray, unfinished: int) -> None:
-        """Add what the islands tallied, and what resting contacts bore to the counts."""
-        self.counts.each[touched] += self._course.impacts[touched]
-        self.counts.impacts += int(total[IMPACTS])
-        self.counts.virial += float(total[VIRIAL]) + self._resting.virial
-        self.counts.wall_impulse[: len(total) - WALLS] += total[WALLS:]
-        self.counts.wall_impulse += self._resting.wall_impulse
-        self.counts.unresolved += unfinished > 0 or self._resting.unresolved
-
-    def _fly_on(self, duration: float) -> None:
-        """Bring everyone to the end of the stretch."""
-        course, neighbours = self._course, self._neighbours
-        count = len(self._constants.mass)
-        crew = ThreadTeam(count)
-        times = crew.each(
-            lambda _, first, last: fly_on(
-                self._constants, self._state, self._world, course.clock, course.acceleration,
-                neighbours.anchor, neighbours.leash, duration, first, last,
-            ),
-            count,
-        )  # fmt: skip
-        self._on_leash = min(times)
-
-    def _look_around(self, duration: float) -> None:
-        """Find the neighbours of all, with leashes for a stretch of ``duration``."""
-        count = len(self._constants.mass)
-        crew = ThreadTeam(count)
-        crew.each(
-            lambda _, first, last: leashes(
-                self._constants.radius, self._state.velocity, self._course.acceleration, duration,
-                self._leash, first, last,
-            ),
-            count,
-        )  # fmt: skip
-        if self._looked % _PLACES_LAST == 0:
-            self._places = places_of(self._state.position, self._world.period)
-        self._looked += 1
-        self._meet_neighbours(self._state.position)
-
-    def _meet_neighbours(self, position: np.ndarray) -> None:
-        self._neighbours, tested, candidates = find_neighbours(
-            position,
-            self._constants.radius,
-            self._leash,
-            self._world.period,
-            self._places,
-            self._hulls,
-            self._find_pairs,
+    def _search(self, position: np.ndarray, skin: np.ndarray, order: Order) -> NeighbourList:
+        """The neighbour list of bodies at ``position`` (n, 3)."""
+        system = self._system
+        count, domain = system.bounded, system.domain[0]
+        spheres = Spheres(
+            np.ascontiguousarray(position[:count]),
+            np.ascontiguousarray(system.body["radius"][:count]),
+            skin,
+            system.particles,
         )
-        if self._world.gravity.any():
+        neighbours, tested, candidates = find_neighbours(
+            spheres, domain["period"], order, self.model.has_polyhedra, self._find_pairs
+        )
+        if domain["gravity"].any():
             # Resting contacts are gone through in this order.
-            in_order(self._neighbours)
+            sort_neighbours(neighbours)
         self.counts.pairs_tested += int(tested)
         self.counts.candidate_pairs += candidates
+        return neighbours
+
+    def _renew_neighbours(self, position: np.ndarray) -> None:
+        state = self.state
+        del state.neighbours  # which takes as much memory as what it takes to make a new one
+        state.neighbours = self._search(position, state.skin, state.order)
+        forget_clearance(state, state.neighbours)
+
+    # ---- islands -----------------------------------------------------------------------------------------------------
+
+    def _run(self, islands: Islands, paths: Paths, predicted: Predicted, duration: float) -> tuple[Paths, int]:
+        """Carry islands through their impacts; the paths with theirs, and how many islands were left unfinished."""
+        system, neighbours, count = self._system, self.state.neighbours, len(islands.start) - 1
+        team = ThreadTeam(ISLAND_COST * count)
+        parts = team.each(
+            lambda _, first, last: run_islands(
+                system, paths.clock, neighbours, predicted, islands, duration, self._accumulator, (first, last)
+            ),
+            count,
+            4 * team.threads,
+        )
+        return extended(paths, [segments for segments, _ in parts]), sum(left for _, left in parts)
+
+    def _predict_across(
+        self, paths: Paths, members: np.ndarray, first_segment: int, duration: float, again: bool
+    ) -> np.ndarray:
+        """Pairs (m, 2) of different islands that collide after all, of those whose path segments start there.
+
+        They are among the ``members`` of the islands that have just been carried through. Where that was done
+        ``again``, some of them may be deflected no more, and collide with others on the paths that they are on instead.
+        """
+        state, system, clock = self.state, self._system, self._clock
+        indices = members if again else members[clock["first_segment"][members] >= 0]
+        if not bound_paths(system, paths, state.neighbours, self._bound, members, duration):
+            # Wider skins for those that strayed: none goes farther than at its greatest speed all the time.
+            segment = paths.segment
+            speed = np.linalg.norm(segment["velocity"], axis=1)
+            speed += np.linalg.norm(system.domain[0]["gravity"]) * duration
+            np.maximum.at(state.skin, segment["particle"], STRAYED_SKIN * speed * duration)
+            position = system.body["position"].copy()
+            deflected = np.flatnonzero(clock["first_segment"] >= 0)
+            position[deflected] = segment["position"][clock["first_segment"][deflected]]
+            indices = np.union1d(deflected, members)
+            self._renew_neighbours(position)
+            first_segment = 0
+        moved = indices, first_segment
+        return predict_across(system, paths, state.neighbours, self._bound, moved, duration)
+
+    def _book(self, total: np.ndarray, disturbed: np.ndarray, borne: Borne, unfinished: int) -> None:
+        """Add what the islands accumulated, and what resting contacts bore, to the counts."""
+        counts = self.counts
+        counts.each[disturbed] += self._clock["impacts"][disturbed]
+        counts.impacts += int(total[IMPACTS])
+        counts.virial += float(total[VIRIAL]) + borne.virial
+        counts.wall_impulse[: len(total) - WALLS] += total[WALLS:]
+        counts.wall_impulse += borne.wall_impulse
+        counts.unresolved += unfinished > 0 or borne.unresolved
 
 
-def _time_for(way: float, speed: float, acceleration: float) -> float:
-    """How long a way takes from ``speed`` at ``acceleration``; inf without either."""
-    denominator = speed + math.sqrt(speed * speed + 2.0 * acceleration * way)
-    return 2.0 * way / denominator if denominator > 0.0 else math.inf
+def _set_tolerances(system: System) -> None:
+    """Set what counts as rest and as a touch in a domain: fractions of the speed of a fall through it, and of sizes."""
+    domain = system.domain[0]
+    gravity = domain["gravity"]
+    size = domain["upper"] - domain["lower"]
+    domain["rest_speed"] = APPROACH_TOLERANCE * math.sqrt(2.0 * float(np.abs(gravity) @ size))
+    loses = system.law["restitution"].min(initial=1.0) < 1.0
+    domain["penetration_slop"] = RESTING_PENETRATION_SLOP if gravity.any() and loses else PENETRATION_SLOP
+
+
+def _time_for(distance: float, speed: float, acceleration: float) -> float:
+    """How long a distance takes from ``speed`` at ``acceleration``; inf without either."""
+    denominator = speed + math.sqrt(speed * speed + 2.0 * acceleration * distance)
+    return 2.0 * distance / denominator if denominator > 0.0 else math.inf

@@ -1,43 +1,57 @@
-"""Axis-aligned bounding boxes of particles, exact for every shape."""
+"""Axis-aligned bounding boxes of shapes, exact for every shape."""
 
 import math
 
 import numpy as np
 
-from particlesim.core.constants import SPHERE
-from particlesim.core.jit import kernel
-from particlesim.core.math3d import load_quat, load_vec3, mat_vec, quat_to_matrix, store_vec3
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
+from particlesim.core.math3d import axpy, dot, load_quat, load_vec3, quat_to_matrix, store_vec3
 from particlesim.geometry.shape_table import ShapeTable
+from particlesim.geometry.support import is_half_space, is_sphere, rounding_of, support_vertex
+
+_ALL = (math.inf, math.inf, math.inf)
 
 
 @kernel
-def hull_extent(vertices, first, last, size, turn):
-    """Lower and upper corner of a hull's box, relative to its centroid, in world axes."""
-    matrix = quat_to_matrix(turn)
-    x0 = y0 = z0 = math.inf
-    x1 = y1 = z1 = -math.inf
-    for v in range(first, last):
-        x, y, z = mat_vec(matrix, load_vec3(vertices, v))
-        x0, y0, z0 = min(x0, x), min(y0, y), min(z0, z)
-        x1, y1, z1 = max(x1, x), max(y1, y), max(z1, z)
-    return (x0 * size, y0 * size, z0 * size), (x1 * size, y1 * size, z1 * size)
-
-
-@kernel(inline=True)
-def particle_extent(kind, vertices, vertex_start, shape, size, turn):
-    """Lower and upper corner of a particle's box, relative to its centroid; the arrays are those of the shape table."""
-    r = 0.5 * size
-    below, above = (-r, -r, -r), (r, r, r)
-    if kind[shape] != SPHERE:
-        below, above = hull_extent(vertices, vertex_start[shape], vertex_start[shape + 1], size, turn)
-    return below, above
+def _reach(table, placed, row):
+    """How far a core reaches along minus and plus a direction in body axes, such as a row of its rotation matrix."""
+    back = -row[0], -row[1], -row[2]
+    low = dot(load_vec3(table.vertex, support_vertex(table, placed[0], back)), row)
+    high = dot(load_vec3(table.vertex, support_vertex(table, placed[0], row)), row)
+    return low * placed[1], high * placed[1]
 
 
 @kernel
+def core_aabb(table, placed):
+    """Lower and upper corner of the bounding box of a core, from the centroid, in world axes [m]."""
+    m = quat_to_matrix(placed[2])
+    x0, x1 = _reach(table, placed, (m[0], m[1], m[2]))
+    y0, y1 = _reach(table, placed, (m[3], m[4], m[5]))
+    z0, z1 = _reach(table, placed, (m[6], m[7], m[8]))
+    return (x0, y0, z0), (x1, y1, z1)
+
+
+@kernel
+def shape_aabb(table, placed):
+    """Lower and upper corner of the bounding box of a placed shape, from its centroid, in world axes [m].
+
+    That of a half-space is all of space.
+    """
+    r = rounding_of(table, placed)
+    lower, upper = (-r, -r, -r), (r, r, r)
+    if is_half_space(table, placed[0]):
+        lower, upper = axpy(lower, _ALL, -1.0), axpy(upper, _ALL, 1.0)
+    elif not is_sphere(table, placed[0]):
+        low, high = core_aabb(table, placed)
+        lower, upper = axpy(low, (r, r, r), -1.0), axpy(high, (r, r, r), 1.0)
+    return lower, upper
+
+
+@entry_kernel
 def _write_aabbs(table, shape, size, orientation, lower, upper):
-    kind, vertices, start = table.kind, table.vertex, table.vertex_start
+    table, shape, size, orientation, lower, upper = without_refcounts((table, shape, size, orientation, lower, upper))
     for i in range(len(shape)):
-        low, high = particle_extent(kind, vertices, start, shape[i], size[i], load_quat(orientation, i))
+        low, high = shape_aabb(table, (shape[i], size[i], load_quat(orientation, i)))
         store_vec3(lower, i, low)
         store_vec3(upper, i, high)
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from particlesim.core.constants import MAX_MANIFOLD
+from particlesim.core.constants import HALF_SPACE, MAX_MANIFOLD
 from particlesim.core.math3d import quat_multiply, quat_normalize
 from particlesim.geometry.narrow_phase.pair import pair_contact
 from particlesim.geometry.shape_table import stack_shapes
@@ -28,9 +28,16 @@ class Pose(NamedTuple):
 class Separation(NamedTuple):
     """How far apart two shapes are.
 
-    ``distance`` [m]: the exact distance if positive; if negative, minus the exact penetration depth, the length of
-    the shortest shift that parts them. ``normal`` (3,): unit, from the first to the second. ``points`` (k, 3) [m]:
-    where they (would) touch, half way between the surfaces; the corners of the patch where faces or edges are parallel.
+    Attributes
+    ----------
+    distance : float [m]
+        If positive, the exact distance; if negative, minus the exact penetration depth, the length of the shortest
+        shift that parts the shapes.
+    normal : (3,) float64
+        Unit, from the first to the second.
+    points : (k, 3) float64 [m]
+        Where the shapes (would) touch, half way between the surfaces: the corners of the patch where faces or edges
+        are parallel.
     """
 
     distance: float
@@ -41,18 +48,36 @@ class Separation(NamedTuple):
 def separation(shape_a: Shape | str, pose_a: Any, shape_b: Shape | str, pose_b: Any) -> Separation:
     """Exact signed distance of two shapes.
 
-    Shapes are names of the catalogue, with its usual parameters, or ``Shape`` objects; poses are ``Pose`` or plain
-    tuples (position, orientation, size), the last two optional. Orientations need not be normalised.
-    ValueError for an unknown shape, one that needs parameters, a pose with numbers that are not finite, a zero
-    quaternion or a size not above 0.
+    Parameters
+    ----------
+    shape_a, shape_b : Shape or str
+        A name of the catalogue, with its usual parameters, or a ``Shape``. A half-space may be the second only.
+    pose_a, pose_b : Pose or tuple
+        (position (3,) [m], orientation (4,) (w, x, y, z), size), the last two optional. Orientations need not be
+        normalised.
+
+    Returns
+    -------
+    Separation
+        Distance, normal from a to b, and contact points; against a half-space the points are on the first shape.
+
+    Raises
+    ------
+    ValueError
+        For an unknown shape, one that needs parameters, a pose with numbers that are not finite, a zero quaternion or
+        a size not above 0, and a half-space as the first shape.
     """
     shapes = [_shape(shape_a), _shape(shape_b)]
-    (position_a, turn_a, size_a), (position_b, turn_b, size_b) = _checked(pose_a), _checked(pose_b)
-    turns = [_of_body_axes(turn, shape) for turn, shape in zip((turn_a, turn_b), shapes, strict=True)]
+    if shapes[0].kind == HALF_SPACE:
+        raise ValueError("a half-space may be the second shape only")
+    (position_a, orientation_a, size_a), (position_b, orientation_b, size_b) = _checked(pose_a), _checked(pose_b)
+    orientations = [_of_body_axes(q, shape) for q, shape in zip((orientation_a, orientation_b), shapes, strict=True)]
     points = np.empty((MAX_MANIFOLD, 3))
     offset = tuple((position_b - position_a).tolist())
     table = stack_shapes(shapes)
-    distance, normal, count = pair_contact(table, 0, size_a, turns[0], 1, size_b, turns[1], offset, points)
+    distance, normal, count = pair_contact(
+        table, (0, size_a, orientations[0]), (1, size_b, orientations[1]), offset, points
+    )
     return Separation(distance, np.array(normal), position_a + points[:count])
 
 
@@ -84,19 +109,19 @@ def _checked(pose: Any) -> tuple[np.ndarray, np.ndarray, float]:
         position, orientation, size = Pose(*pose)
     except TypeError as error:
         raise ValueError(f"a pose is (position, orientation, size), the last two optional, not {pose!r}") from error
-    where = _finite(position, 3, "a position")
-    turn = _finite(orientation, 4, "an orientation")
+    at = _finite(position, 3, "a position")
+    quaternion = _finite(orientation, 4, "an orientation")
     factor = _finite([size], 1, "a size")[0]
-    if not turn.any():
+    if not quaternion.any():
         raise ValueError("an orientation must not be all zero")
     if factor <= 0.0:
         raise ValueError(f"a size must be above 0, not {size}")
     # First by the largest: the squares of a tiny or huge quaternion are not numbers that float64 has.
-    turn /= np.abs(turn).max()
-    return where, turn / np.linalg.norm(turn), float(factor)
+    quaternion /= np.abs(quaternion).max()
+    return at, quaternion / np.linalg.norm(quaternion), float(factor)
 
 
-def _of_body_axes(turn: np.ndarray, shape: Shape) -> tuple[float, ...]:
-    """The orientation of a shape's body axes when ``turn`` is that of the axes it was described in."""
-    product = quat_multiply(tuple(turn.tolist()), tuple(shape.orientation.tolist()))
+def _of_body_axes(described: np.ndarray, shape: Shape) -> tuple[float, ...]:
+    """The orientation of a shape's body axes when ``described`` is that of the axes it was described in."""
+    product = quat_multiply(tuple(described.tolist()), tuple(shape.orientation.tolist()))
     return tuple(quat_normalize(product))

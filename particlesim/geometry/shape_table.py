@@ -3,52 +3,93 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from particlesim.core.records import record
 from particlesim.geometry.shapes import Shape
+
+# A shape: a convex core and a rounding radius. Ranges are half open, into the other arrays of the table.
+SHAPE = record(
+    [
+        ("kind", np.int64),  # SPHERE, CAPSULE, POLYHEDRON or HALF_SPACE
+        ("radius", np.float64),  # of the bounding sphere at size 1, rounding included [m]
+        ("inradius", np.float64),  # of the inscribed sphere at size 1, rounding included [m]
+        ("rounding", np.float64),  # how far the surface is outside of the core at size 1 [m]
+        ("first_vertex", np.int64),
+        ("last_vertex", np.int64),
+        ("first_face", np.int64),
+        ("last_face", np.int64),
+        ("first_edge", np.int64),
+        ("last_edge", np.int64),
+    ],
+)
+
+# A face of a core. The solid is on the side that the normal points away from; a half-space is its one face.
+FACE = record(
+    [
+        ("normal", np.float64, (3,)),  # outward, body axes
+        ("offset", np.float64),  # of its plane from the centroid at size 1, along the normal [m]
+        ("first", np.int64),  # its vertices are loop[first:last]
+        ("last", np.int64),
+    ],
+)
 
 
 class ShapeTable(NamedTuple):
-    """All shapes of a scene end to end. ``x_start[s]:x_start[s + 1]`` are the rows of shape ``s``."""
+    """All shapes of a scene end to end."""
 
-    kind: np.ndarray  # (s,) int64: SPHERE or HULL
-    radius: np.ndarray  # (s,) bounding sphere of size 1 [m]
-    vertex: np.ndarray  # (v, 3) of size 1, body axes [m]
-    vertex_start: np.ndarray  # (s + 1,)
-    face_normal: np.ndarray  # (f, 3) outward, body axes
-    face_offset: np.ndarray  # (f,) distance of the face's plane from the centroid at size 1 [m]
-    face_start: np.ndarray  # (s + 1,)
-    loop: np.ndarray  # (l,) vertices of the faces in order, counted from the shape's first
-    loop_start: np.ndarray  # (f + 1,)
-    edge: np.ndarray  # (e, 4): two vertices, then two faces, counted from the shape's first
-    edge_start: np.ndarray  # (s + 1,)
+    shape: np.ndarray  # (s,) SHAPE
+    vertex: np.ndarray  # (v, 3) float64, of the cores at size 1, body axes [m]
+    face: np.ndarray  # (f,) FACE
+    loop: np.ndarray  # (l,) int64, rows of vertex: the outlines of the faces, counter-clockwise seen from outside
+    edge: np.ndarray  # (e, 4) int64: two rows of vertex, then the faces to the left and right, -1 for none
 
 
 def stack_shapes(shapes: Sequence[Shape]) -> ShapeTable:
     """The shapes as one table for the kernels."""
-    normals = [shape.face_normals for shape in shapes]
-    offsets = [
-        [float(normal @ shape.vertices[loop[0]]) for normal, loop in zip(rows, shape.faces, strict=True)]
-        for shape, rows in zip(shapes, normals, strict=True)
+    table = np.zeros(len(shapes), dtype=SHAPE)
+    for field in ("kind", "radius", "inradius", "rounding"):
+        table[field] = [getattr(shape, field) for shape in shapes]
+    edges = [np.array(shape.edges, dtype=np.int64).reshape(-1, 4) for shape in shapes]
+    counts = {
+        "vertex": [len(shape.vertices) for shape in shapes],
+        "face": [len(shape.faces) for shape in shapes],
+        "edge": [len(rows) for rows in edges],
+    }
+    for name, count in counts.items():
+        table[f"last_{name}"] = np.cumsum(count)
+        table[f"first_{name}"] = table[f"last_{name}"] - count
+    loops = [
+        np.array(loop) + first
+        for shape, first in zip(shapes, table["first_vertex"], strict=True)
+        for loop in shape.faces
     ]
-    edges = [shape.edges for shape in shapes]
-    loops = [loop for shape in shapes for loop in shape.faces]
     return ShapeTable(
-        kind=np.array([shape.kind for shape in shapes], dtype=np.int64),
-        radius=np.array([shape.radius for shape in shapes], dtype=np.float64),
+        shape=table,
         vertex=np.concatenate([np.zeros((0, 3)), *(shape.vertices for shape in shapes)]),
-        vertex_start=_starts([len(shape.vertices) for shape in shapes]),
-        face_normal=np.concatenate([np.zeros((0, 3)), *normals]),
-        face_offset=np.array([x for rows in offsets for x in rows], dtype=np.float64),
-        face_start=_starts([len(shape.faces) for shape in shapes]),
-        loop=np.array([v for loop in loops for v in loop], dtype=np.int64),
-        loop_start=_starts([len(loop) for loop in loops]),
-        edge=np.array([e for rows in edges for e in rows], dtype=np.int64).reshape(-1, 4),
-        edge_start=_starts([len(rows) for rows in edges]),
+        face=_faces(shapes, [len(loop) for loop in loops]),
+        loop=np.concatenate([np.zeros(0, dtype=np.int64), *loops]),
+        edge=np.concatenate(
+            [np.zeros((0, 4), dtype=np.int64), *(_numbered(e, s) for e, s in zip(edges, table, strict=True))]
+        ),
     )
 
 
-def _starts(counts: Sequence[int]) -> np.ndarray:
-    return np.concatenate([[0], np.cumsum(np.asarray(counts, dtype=np.int64))]).astype(np.int64)
+def _faces(shapes: Sequence[Shape], corners: Sequence[int]) -> np.ndarray:
+    """The faces of all shapes, (f,) FACE; ``corners`` says how many vertices each has."""
+    face = np.zeros(len(corners), dtype=FACE)
+    normals = [normal for shape in shapes for normal in shape.face_normals]
+    starts = [shape.vertices[loop[0]] for shape in shapes for loop in shape.faces]
+    face["normal"] = np.array(normals).reshape(-1, 3)
+    face["offset"] = [float(normal @ start) for normal, start in zip(normals, starts, strict=True)]
+    face["last"] = np.cumsum(corners)
+    face["first"] = face["last"] - corners
+    return face
+
+
+def _numbered(edges: np.ndarray, shape: Any) -> np.ndarray:
+    """Edges of one shape with the numbers that its vertices and faces have in the table."""
+    shift = np.array([shape["first_vertex"], shape["first_vertex"], shape["first_face"], shape["first_face"]])
+    return np.where(edges < 0, -1, edges + shift)

@@ -6,27 +6,26 @@ follows from it and the orientation.
 
 import math
 
-import numpy as np
-
 from particlesim.core.jit import kernel
 from particlesim.core.math3d import (
+    add,
     axpy,
     cross,
     dot,
     inverse_rotate,
-    load_quat,
-    load_vec3,
     norm,
     quat_from_rotvec,
     quat_multiply,
     quat_normalize,
     rotate,
     scale,
-    store_vec3,
+    set_quat,
+    set_vec3,
+    to_quat,
+    to_vec3,
 )
-
-# Moments of inertia closer than this fraction of each other are equal: the body is a symmetric top.
-_EQUAL_MOMENTS = 1e-12
+from particlesim.model.bodies import DYNAMIC, EQUAL_MOMENTS, KINEMATIC, angular_velocity
+from particlesim.model.prescribed_motion import NO_SWING, swing_shift
 
 # An asymmetric body turns by at most this angle [rad] in one stage of the quadrature, whose error falls as its
 # seventh power: about 1e-13 rad.
@@ -46,68 +45,44 @@ _WEIGHTS = (5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0)
 
 @kernel
 def _equal(a, b):
-    return abs(a - b) <= _EQUAL_MOMENTS * (a + b)
+    return abs(a - b) <= EQUAL_MOMENTS * (a + b)
 
 
 @kernel
-def _unique_axis(moments):
+def _unique_axis(principal_inertia):
     """Axis of a symmetric top, 3 for a body without preferred axis, -1 for an asymmetric one."""
-    if _equal(moments[0], moments[1]):
-        return 3 if _equal(moments[1], moments[2]) else 2
-    if _equal(moments[1], moments[2]):
+    if _equal(principal_inertia[0], principal_inertia[1]):
+        return 3 if _equal(principal_inertia[1], principal_inertia[2]) else 2
+    if _equal(principal_inertia[1], principal_inertia[2]):
         return 0
-    return 1 if _equal(moments[0], moments[2]) else -1
+    return 1 if _equal(principal_inertia[0], principal_inertia[2]) else -1
 
 
 @kernel
-def spin_of(turn, momentum, moments):
-    """Angular velocity of a body with the given angular momentum about its centroid, both in world axes."""
-    body = inverse_rotate(turn, momentum)
-    return rotate(turn, (body[0] / moments[0], body[1] / moments[1], body[2] / moments[2]))
-
-
-@kernel
-def spin_rate(turn, momentum, moments):
+def angular_speed(b):
     """How fast a body turns [rad/s]; one without preferred axis turns about its angular momentum."""
-    if _unique_axis(moments) == 3:
-        return norm(momentum) / moments[0]
-    return norm(spin_of(turn, momentum, moments))
+    if b.isotropic_inertia > 0.0:
+        return norm(to_vec3(b.angular_momentum)) / b.isotropic_inertia
+    return norm(angular_velocity(b))
 
 
 @kernel
-def particle_spin(constants, state, i):
-    """Angular velocity of particle ``i``, world axes [rad/s]."""
-    return spin_of(
-        load_quat(state.orientation, i), load_vec3(state.angular_momentum, i), load_vec3(constants.inertia, i)
-    )
-
-
-@kernel
-def spins(constants, state):
-    """Angular velocities of all particles, (n, 3), world axes [rad/s]."""
-    out = np.empty_like(state.angular_momentum)
-    for i in range(len(out)):
-        store_vec3(out, i, particle_spin(constants, state, i))
-    return out
-
-
-@kernel
-def _symmetric_top(turn, momentum, moments, axis, time):
+def _symmetric_top(orientation, momentum, principal_inertia, axis, time):
     """Orientation of a symmetric top after ``time``.
 
     It turns about its angular momentum L at L / I and about its own axis at (1 / I_axis - 1 / I) L_axis, both
     steady (L. D. Landau, E. M. Lifshitz, Mechanics, 3rd ed., section 33).
     """
-    across = moments[0] if axis != 0 else moments[1]
-    body = inverse_rotate(turn, momentum)
-    spin = (1.0 / moments[axis] - 1.0 / across) * body[axis] * time
+    across = principal_inertia[0] if axis != 0 else principal_inertia[1]
+    own = inverse_rotate(orientation, momentum)
+    spin = (1.0 / principal_inertia[axis] - 1.0 / across) * own[axis] * time
     about_axis = (
         spin if axis == 0 else 0.0,
         spin if axis == 1 else 0.0,
         spin if axis == 2 else 0.0,
     )
-    turn = quat_multiply(turn, quat_from_rotvec(about_axis))
-    return quat_normalize(quat_multiply(quat_from_rotvec(scale(momentum, time / across)), turn))
+    orientation = quat_multiply(orientation, quat_from_rotvec(about_axis))
+    return quat_normalize(quat_multiply(quat_from_rotvec(scale(momentum, time / across)), orientation))
 
 
 @kernel
@@ -130,17 +105,17 @@ def _stage(q, m, rates_q, rates_m, weights, time):
 
 
 @kernel
-def _asymmetric_turn(turn, body_momentum, moments, time):
+def _asymmetric_turn(orientation, body_momentum, principal_inertia, time):
     """Orientation and angular momentum in body axes after a short ``time``, by one step of Gauss-Legendre."""
-    inverse = (1.0 / moments[0], 1.0 / moments[1], 1.0 / moments[2])
-    q0, m0 = _rates(turn, body_momentum, inverse)
+    inverse = (1.0 / principal_inertia[0], 1.0 / principal_inertia[1], 1.0 / principal_inertia[2])
+    q0, m0 = _rates(orientation, body_momentum, inverse)
     rates_q, rates_m = (q0, q0, q0), (m0, m0, m0)
     # The stages are implicit: iterated until they repeat. Each round gains a factor of the angle turned.
     limit = 1e-16 * norm(body_momentum) * norm(m0)
     for _ in range(40):
-        qa, ma = _stage(turn, body_momentum, rates_q, rates_m, _GAUSS[0], time)
-        qb, mb = _stage(turn, body_momentum, rates_q, rates_m, _GAUSS[1], time)
-        qc, mc = _stage(turn, body_momentum, rates_q, rates_m, _GAUSS[2], time)
+        qa, ma = _stage(orientation, body_momentum, rates_q, rates_m, _GAUSS[0], time)
+        qb, mb = _stage(orientation, body_momentum, rates_q, rates_m, _GAUSS[1], time)
+        qc, mc = _stage(orientation, body_momentum, rates_q, rates_m, _GAUSS[2], time)
         qa, ma = _rates(qa, ma, inverse)
         qb, mb = _rates(qb, mb, inverse)
         qc, mc = _rates(qc, mc, inverse)
@@ -149,43 +124,103 @@ def _asymmetric_turn(turn, body_momentum, moments, time):
         rates_q, rates_m = (qa, qb, qc), (ma, mb, mc)
         if change * norm(body_momentum) <= limit and change_q * time <= 1e-16:
             break
-    turn, body_momentum = _stage(turn, body_momentum, rates_q, rates_m, _WEIGHTS, time)
-    return quat_normalize(turn), body_momentum
+    orientation, body_momentum = _stage(orientation, body_momentum, rates_q, rates_m, _WEIGHTS, time)
+    return quat_normalize(orientation), body_momentum
 
 
 @kernel
-def _asymmetric_top(turn, momentum, moments, time):
-    """Orientation of a body with three different moments after ``time``."""
-    body = inverse_rotate(turn, momentum)
-    fastest = norm(momentum) / min(moments[0], moments[1], moments[2])
+def _asymmetric_top(orientation, momentum, principal_inertia, time):
+    """Orientation of a body with three different principal moments after ``time``."""
+    own = inverse_rotate(orientation, momentum)
+    fastest = norm(momentum) / min(principal_inertia[0], principal_inertia[1], principal_inertia[2])
     parts = max(1, math.ceil(fastest * abs(time) / _MAX_TURN))
     for _ in range(parts):
-        turn, body = _asymmetric_turn(turn, body, moments, time / parts)
+        orientation, own = _asymmetric_turn(orientation, own, principal_inertia, time / parts)
     # The quadrature keeps the energy and the length of the momentum; this nudge keeps its direction in space.
-    drifted = rotate(turn, body)
+    drifted = rotate(orientation, own)
     nudge = quat_from_rotvec(scale(cross(drifted, momentum), 1.0 / dot(momentum, momentum)))
-    return quat_normalize(quat_multiply(nudge, turn))
+    return quat_normalize(quat_multiply(nudge, orientation))
 
 
 @kernel
-def free_rotation(turn, momentum, moments, time):
+def isotropic_rotation(orientation, momentum, inertia, time):
+    """Orientation after ``time`` [s] of a free body without preferred axis: it turns about its angular momentum."""
+    step = quat_from_rotvec(scale(momentum, time / inertia))
+    return quat_normalize(quat_multiply(step, orientation))
+
+
+@kernel
+def free_rotation(orientation, momentum, principal_inertia, time):
     """Orientation of a free body with the given angular momentum (world axes) after ``time`` [s], of either sign.
 
     Closed forms for spheres, cubes and every symmetric top; Gauss-Legendre of order 6 for the rest.
     """
     if dot(momentum, momentum) == 0.0:
-        return turn
-    axis = _unique_axis(moments)
+        return orientation
+    axis = _unique_axis(principal_inertia)
     if axis == 3:
-        step = quat_from_rotvec(scale(momentum, time / moments[0]))
-        return quat_normalize(quat_multiply(step, turn))
+        return isotropic_rotation(orientation, momentum, principal_inertia[0], time)
     if axis >= 0:
-        return _symmetric_top(turn, momentum, moments, axis, time)
-    return _asymmetric_top(turn, momentum, moments, time)
+        return _symmetric_top(orientation, momentum, principal_inertia, axis, time)
+    return _asymmetric_top(orientation, momentum, principal_inertia, time)
+
+
+# ---- paths ---------------------------------------------------------------------------------------------------------
+# A path says where a body is and how it moves at one moment, and so at any other as long as nothing strikes it:
+# (position, orientation, velocity, angular momentum, acceleration, swing).
 
 
 @kernel
-def free_path(position, turn, velocity, momentum, moments, gravity, time):
-    """Position, orientation and velocity of a particle after ``time`` [s] of either sign."""
-    position = axpy(axpy(position, velocity, time), gravity, 0.5 * time * time)
-    return position, free_rotation(turn, momentum, moments, time), axpy(velocity, gravity, time)
+def free_acceleration(system, b):
+    """The acceleration of a body that nothing strikes: gravity, or none of what rests and of obstacles [m/s^2]."""
+    if b.kind != DYNAMIC or b.resting != 0:
+        return 0.0, 0.0, 0.0
+    return to_vec3(system.domain[0].gravity)
+
+
+@kernel
+def path_of_body(system, i):
+    """The path that body ``i`` is on as its record has it."""
+    b = system.body[i]
+    swing = NO_SWING
+    if b.kind == KINEMATIC:
+        m = system.motion[b.motion]
+        swing = to_vec3(m.amplitude), m.angular_frequency, m.angle
+    return (
+        to_vec3(b.position),
+        to_quat(b.orientation),
+        to_vec3(b.velocity),
+        to_vec3(b.angular_momentum),
+        free_acceleration(system, b),
+        swing,
+    )
+
+
+@kernel
+def place_on_path(path, principal_inertia, time):
+    """Position, orientation and velocity on a path after ``time`` [s] of either sign."""
+    position, orientation, velocity, momentum, acceleration, swing = path
+    position = axpy(axpy(position, velocity, time), acceleration, 0.5 * time * time)
+    velocity = axpy(velocity, acceleration, time)
+    if swing[1] != 0.0:
+        shift, change = swing_shift(swing, time)
+        position, velocity = add(position, shift), add(velocity, change)
+    return position, free_rotation(orientation, momentum, principal_inertia, time), velocity
+
+
+@kernel
+def advance_path(path, principal_inertia, time):
+    """The path as seen ``time`` seconds later."""
+    if time == 0.0:
+        return path
+    position, orientation, velocity = place_on_path(path, principal_inertia, time)
+    amplitude, frequency, angle = path[5]
+    return position, orientation, velocity, path[3], path[4], (amplitude, frequency, angle + frequency * time)
+
+
+@kernel
+def set_pose(b, position, orientation, velocity):
+    """Put a body somewhere, at a velocity."""
+    set_vec3(b.position, position)
+    set_quat(b.orientation, orientation)
+    set_vec3(b.velocity, velocity)

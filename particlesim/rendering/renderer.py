@@ -14,17 +14,17 @@ from particlesim.rendering.hud.overlay import Overlay
 from particlesim.rendering.look import Look
 from particlesim.rendering.octree_cells import cell_lines, octree_cells
 from particlesim.rendering.quality import PRESETS
-from particlesim.rendering.shading.ambient_occlusion import Sky
+from particlesim.rendering.shading.ambient_occlusion import AmbientOcclusion
 from particlesim.rendering.shading.environment import Environment
-from particlesim.rendering.shading.floor import Ground
+from particlesim.rendering.shading.floor import FloorOcclusion
 from particlesim.rendering.shading.fxaa import fxaa
 from particlesim.rendering.shading.lighting import key_light
-from particlesim.rendering.shading.surfaces import TILE, surfaces_of, table_of
-from particlesim.rendering.visibility.geometry_tables import bodies_of
-from particlesim.rendering.visibility.instances import Cast, cast_of
-from particlesim.rendering.visibility.occlusion_clusters import Groups, grouped
-from particlesim.rendering.visibility.projection import Outlook
-from particlesim.rendering.visibility.rasterise import Sight, look
+from particlesim.rendering.shading.surfaces import TILE, surface_table, surfaces_of
+from particlesim.rendering.visibility.geometry_tables import geometry_tables
+from particlesim.rendering.visibility.instances import Instances, instances_of
+from particlesim.rendering.visibility.occlusion_clusters import OcclusionClusters, occlusion_clusters
+from particlesim.rendering.visibility.projection import Projection
+from particlesim.rendering.visibility.rasterise import VisibilityBuffer, rasterise
 from particlesim.trajectory.frames import Frame
 
 # Widths of lines [pixels] in a picture 720 pixels high: the edges of the world, and those of the octree's cells.
@@ -48,16 +48,18 @@ class Renderer:
         self._drawn_size = (quality.samples * self._size[0], quality.samples * self._size[1])
         self._environment = environment = Environment(scene)
         self._overlay = Overlay(look, environment.dark)
-        self._bodies = bodies = bodies_of(look.header)
+        self._tables = tables = geometry_tables(look.header)
         self._light = key_light(scene, round(quality.shadow * self._size[1]))
-        self._sky = Sky(np.asarray(scene.world.size), bodies.outer) if quality.ambient_occlusion else None
+        self._ambient_occlusion = (
+            AmbientOcclusion(np.asarray(scene.world.size), tables.radius) if quality.ambient_occlusion else None
+        )
         shaded = environment.has_floor and quality.ambient_occlusion
-        self._ground = Ground(*environment.floor, bodies.inner, bodies.outer) if shaded else None
+        self._floor = FloorOcclusion(*environment.floor, tables.inradius, tables.radius) if shaded else None
         tile = np.array([(0.5 * TILE, 0.5 * TILE, 0.0)])
-        self._spheres, self._hulls = bridge.Layer(bridge.SPHERES, tile), bridge.Layer(bridge.HULLS, tile)
+        self._surfaces = [bridge.Layer(kind, tile) for kind in bridge.SURFACES]
         floor = [bridge.Layer(bridge.FLOOR, geometry.SQUARE)] if environment.has_floor else []
         self._lines = bridge.Layer(bridge.LINE, geometry.STRIP)
-        layers = [self._spheres, self._hulls, *floor, self._lines]
+        layers = [*self._surfaces, *floor, self._lines]
         self._canvas = bridge.Canvas(found, self._size, layers, environment.background, quality.samples)
 
     def __enter__(self) -> Renderer:
@@ -88,20 +90,20 @@ class Renderer:
         (height, width, 3) uint8, sRGB.
         """
         view = view_at(self._look.scene, frame.time, self._size[0] / self._size[1], self._look.subject)
-        cast = cast_of(self._look.scene, self._look.header, frame, self._bodies)
-        groups = grouped(cast.position, cast.bodies.outer)
-        outlook = self._outlook(view)
-        sight = look(outlook, cast.bodies, groups, cast.orientation)
-        # While the light looks, what the camera saw is worked up: that leaves a core idle now and then.
-        shadow = self._beside.submit(self._shadow_map, cast, groups)
-        first_row, surfaces = self._put_particles(frame, cast, outlook, sight)
+        instances = instances_of(self._look.scene, self._look.header, frame, self._tables)
+        clusters = occlusion_clusters(instances.position, instances.tables.radius)
+        projection = self._projection(view)
+        buffer = rasterise(projection, instances, clusters)
+        # While the shadow map is made, what the camera sees is tabled: that leaves a core idle now and then.
+        shadow = self._beside.submit(self._shadow_map, instances, clusters)
+        pixel, surfaces = self._put_particles(frame, instances, projection, buffer)
         self._put_lines(view, frame)
         picture = self._bridge.Picture(
             view_block=self._view_block(view),
             shadow=shadow.result(),
-            first_row=first_row,
+            pixel=pixel,
             surfaces=surfaces,
-            ground=np.ones((1, 1)) if self._ground is None else self._ground.light(cast.position, cast.whose),
+            floor=np.ones((1, 1)) if self._floor is None else self._floor.light(instances.position, instances.source),
         )
         drawn = self._canvas.draw(picture)
         # OpenGL's first row is the lowest, and it has a fourth channel.
@@ -109,28 +111,31 @@ class Renderer:
         self._overlay.draw(image, frame, history or History())
         return image
 
-    def _outlook(self, view: View) -> Outlook:
+    def _projection(self, view: View) -> Projection:
         slope = float(np.tan(0.5 * view.field_of_view))
         axes = view.pose[:3, :3].T * np.array([[1.0], [1.0], [-1.0]])
-        return Outlook(axes, view.pose[:3, 3], False, 0.5 * self._drawn_size[1] / slope, self._drawn_size)
+        return Projection(axes, view.pose[:3, 3], False, 0.5 * self._drawn_size[1] / slope, self._drawn_size)
 
-    def _put_particles(self, frame: Frame, cast: Cast, outlook: Outlook, sight: Sight) -> tuple[np.ndarray, np.ndarray]:
-        """Tiles into the layers of spheres and hulls; what is seen at each pixel, and its table (see Picture)."""
-        surfaces = surfaces_of(sight, cast.bodies)
-        self._spheres.put(TILE * np.argwhere(surfaces.balls)[:, ::-1])
-        self._hulls.put(TILE * np.argwhere(surfaces.hulls)[:, ::-1])
-        paint = self._paint(frame, cast, surfaces.seen)
-        return surfaces.first_row, table_of(surfaces, cast.bodies, outlook, cast.position, cast.orientation, paint)
+    def _put_particles(
+        self, frame: Frame, instances: Instances, projection: Projection, buffer: VisibilityBuffer
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Tiles into the layers of surfaces; what is seen at each pixel, and its table (see Picture)."""
+        surfaces = surfaces_of(buffer, instances.tables)
+        for layer, tiles in zip(self._surfaces, surfaces.tiles, strict=True):
+            layer.put(TILE * np.argwhere(tiles)[:, ::-1])
+        paint = self._paint(frame, instances, surfaces.seen)
+        return surfaces.pixel, surface_table(surfaces, instances, projection, paint)
 
-    def _paint(self, frame: Frame, cast: Cast, members: np.ndarray) -> np.ndarray:
-        """Linear colour, and share of the sky's light, of some of the cast, (k, 4) float64."""
-        sky = self._sky
-        light = np.ones(len(members)) if sky is None else sky.light(cast.position, members, cast.whose)
-        return np.column_stack([self._look.colours(frame, cast.particles(members)), light])
+    def _paint(self, frame: Frame, instances: Instances, indices: np.ndarray) -> np.ndarray:
+        """Linear colour, and share of the ambient light, of some instances, (k, 4) float64."""
+        light = np.ones(len(indices))
+        if self._ambient_occlusion is not None:
+            light = self._ambient_occlusion.light(instances.position, indices, instances.source)
+        return np.column_stack([self._look.colours(frame, instances.bodies(indices)), light])
 
-    def _shadow_map(self, cast: Cast, groups: Groups) -> np.ndarray:
+    def _shadow_map(self, instances: Instances, clusters: OcclusionClusters) -> np.ndarray:
         """The shadow map: closeness to the key light of the surface that it shines on, (h, w) float32 [m]."""
-        return look(self._light.outlook, cast.bodies, groups, cast.orientation).close
+        return rasterise(self._light.projection, instances, clusters).inverse_depth
 
     def _put_lines(self, view: View, frame: Frame) -> None:
         """The edges of the world and, if they are shown, of the octree's cells."""

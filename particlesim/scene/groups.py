@@ -18,6 +18,7 @@ from pydantic import (
     model_validator,
 )
 
+from particlesim.core.polyhedra import POLYHEDRA
 from particlesim.scene.base import (
     MAX_COUNT,
     File,
@@ -36,11 +37,35 @@ from particlesim.scene.base import (
 )
 from particlesim.scene.messages import hint, listed, must_be, one_of
 
+# The scene file names polyhedra without parameters as core.polyhedra does.
+_PolyhedronName: Any = Literal.__getitem__(tuple(POLYHEDRA))
 
-class PlainShape(Model):
-    """A shape with nothing to choose: a sphere of diameter 1, a cube or a tetrahedron of edge 1, times the size."""
 
-    kind: Literal["sphere", "cube", "tetrahedron"]
+class SphereShape(Model):
+    """A sphere of diameter 1, times the size."""
+
+    kind: Literal["sphere"]
+
+
+class CapsuleShape(Model):
+    """All points within 0.5 of a segment along z, times the size; ``length`` is that of the segment.
+
+    So the capsule is a cylinder of diameter 1 between two half spheres whose centres are ``length`` apart.
+    """
+
+    kind: Literal["capsule"]
+    length: Positive
+
+
+# A rounded polyhedron is all points within this distance of it, times the size: a cube with rounding 0.1 is 1.2 wide.
+Rounding = NotNegative
+
+
+class PolyhedronShape(Model):
+    """A polyhedron of edge 1, times the size."""
+
+    kind: _PolyhedronName
+    rounding: Rounding = 0.0
 
 
 class BoxShape(Model):
@@ -48,6 +73,7 @@ class BoxShape(Model):
 
     kind: Literal["box"]
     edges: PositiveVector
+    rounding: Rounding = 0.0
 
 
 class PyramidShape(Model):
@@ -55,6 +81,7 @@ class PyramidShape(Model):
 
     kind: Literal["pyramid"]
     height: Positive = 1.0
+    rounding: Rounding = 0.0
 
 
 class MeshShape(Model):
@@ -62,6 +89,7 @@ class MeshShape(Model):
 
     kind: Literal["mesh"]
     file: File
+    rounding: Rounding = 0.0
 
     @field_validator("file")
     @classmethod
@@ -69,12 +97,14 @@ class MeshShape(Model):
         return info.context["folder"] / file if info.context else file
 
 
-_Shapes = Annotated[PlainShape | BoxShape | PyramidShape | MeshShape, Field(discriminator="kind")]
+_Shapes = Annotated[
+    SphereShape | CapsuleShape | PolyhedronShape | BoxShape | PyramidShape | MeshShape, Field(discriminator="kind")
+]
 AnyShape = Annotated[
     _Shapes,
     shorthand(
         'a shape such as "sphere", or a table such as { kind = "box", edges = [1, 2, 3] }',
-        _Shapes | Literal["sphere", "cube", "tetrahedron", "pyramid"],
+        _Shapes | Literal["sphere", "pyramid"] | _PolyhedronName,
     ),
 ]
 

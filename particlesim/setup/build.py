@@ -4,32 +4,28 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from particlesim.broad_phase import find_pairs
-from particlesim.core.constants import (
-    APPROACH_TOLERANCE,
-    MAX_MANIFOLD,
-    OPEN,
-    PENETRATION_SLOP,
-    PERIODIC,
-    RESTING_PENETRATION_SLOP,
-    WALL,
-    WALL_NAMES,
-)
+from particlesim.core.constants import OPEN, PERIODIC, WALL, WALL_NAMES
 from particlesim.core.rotations import quaternions_of, rotations_of
-from particlesim.geometry.shape_table import ShapeTable, stack_shapes
-from particlesim.geometry.shapes import CATALOGUE, Shape
-from particlesim.model.bodies import Constants, State, World, particle_constants
-from particlesim.model.touching import contact_now, touching_pairs, touching_walls, wall_of_partner
+from particlesim.geometry.shape_table import stack_shapes
+from particlesim.geometry.shapes import CATALOGUE, Shape, half_space
+from particlesim.model.bodies import make_particles
+from particlesim.model.domain import make_domain, make_walls, wall_normals
+from particlesim.model.materials import Material, contact_laws
+from particlesim.model.overlap import separation_of, touching_half_spaces, touching_pairs
+from particlesim.model.system import Model, System, make_system
 from particlesim.scene import Scene
 from particlesim.scene.file import SceneError
 from particlesim.scene.groups import FixedSize, Group, ListPlacement, MeshShape, Turn
-from particlesim.setup.initial_motion import initial_state, random_quaternions
+from particlesim.setup.initial_motion import random_quaternions, set_in_motion
+from particlesim.setup.obstacles import Obstacle, obstruct
 from particlesim.setup.placement import positions
+from particlesim.setup.space import Crowd, Space
 
 # Density of particles that give neither density nor mass: water [kg/m^3].
 _DEFAULT_DENSITY = 1000.0
@@ -46,50 +42,72 @@ BYTES_PER_PARTICLE = 1000
 _BOUNDARIES = {"wall": WALL, "periodic": PERIODIC, "open": OPEN}
 
 
-class Built(NamedTuple):
-    """A scene as arrays."""
-
-    shapes: tuple[Shape, ...]
-    table: ShapeTable
-    world: World
-    constants: Constants
-    state: State
-
-
-def build(scene: Scene) -> Built:
-    """The arrays a simulation of ``scene`` starts from. SceneError if something does not fit or cannot be read."""
+def build(scene: Scene, obstacles: Sequence[Obstacle] = ()) -> Model:
+    """The model that a simulation of ``scene`` starts from. SceneError if something does not fit or cannot be read."""
     check_memory(scene.number)
     randoms = [np.random.default_rng([scene.seed, g]) for g in range(len(scene.particles))]
     shapes, shape_of_group = _shapes(scene)
-    table = stack_shapes(shapes)
-    world = build_world(scene)
-    constants = _constants(scene, shapes, shape_of_group, randoms)
-    _check_sizes(scene, world, constants)
-    _check_volume(scene, world, shapes, constants)
-    orientation = _orientations(scene, shapes, constants, randoms)
-    position = positions(scene, table, world, constants, orientation, randoms)
-    state = initial_state(scene, constants, position, orientation, randoms)
-    _check_apart(scene, table, world, constants, state)
-    return Built(tuple(shapes), table, world, constants, state)
+    domain = build_domain(scene)
+    particles = _particles(scene, shapes, shape_of_group, randoms)
+    _check_sizes(scene, domain[0], particles)
+    _check_volume(scene, domain[0], shapes, particles)
+    particles["orientation"] = _orientations(scene, shapes, particles, randoms)
+    model = assemble(shapes, particles, domain, materials_of(scene), obstacles)
+    crowd = Crowd(*(np.ascontiguousarray(particles[name]) for name in ("shape_row", "group", "scale", "radius")))
+    particles = model.particles
+    particles["position"] = positions(
+        scene, model.system.shapes, space_of(domain), crowd, np.ascontiguousarray(particles["orientation"]), randoms
+    )
+    set_in_motion(scene, particles, randoms)
+    _check_apart(scene, model.system)
+    return model
 
 
-def build_world(scene: Scene) -> World:
-    """The world of a scene as arrays."""
-    half = 0.5 * np.array(scene.world.size)
+def assemble(
+    shapes: list[Shape],
+    particles: np.ndarray,
+    domain: np.ndarray,
+    materials: list[Material],
+    obstacles: Sequence[Obstacle] = (),
+) -> Model:
+    """A model of particles (n,) BODY in a domain, (1,) DOMAIN, with its walls and other obstacles.
+
+    The first of the ``materials`` is that of the walls, the others those of the particles.
+    """
+    walls = [half_space(tuple(normal)) for normal in wall_normals().tolist()]
+    table = stack_shapes([*shapes, *walls, *(obstacle.shape for obstacle in obstacles)])
+    others = obstruct(obstacles, len(shapes) + len(walls), len(materials))
+    materials = [*materials, *(obstacle.material for obstacle in obstacles)]
+    half_spaces = np.concatenate([make_walls(domain, len(shapes)), others.half_spaces])
+    system = make_system(
+        table,
+        particles,
+        others.bounded,
+        half_spaces,
+        law=contact_laws(materials),
+        motion=others.motion,
+        domain=domain,
+    )
+    return Model(tuple(shapes), np.array([material.restitution for material in materials]), system)
+
+
+def materials_of(scene: Scene) -> list[Material]:
+    """The material of the walls, then that of each group."""
+    usual = scene.world.restitution
+    groups = (usual if group.restitution is None else group.restitution for group in scene.particles)
+    return [Material(restitution) for restitution in (usual, *groups)]
+
+
+def build_domain(scene: Scene) -> np.ndarray:
+    """The domain of a scene, (1,) DOMAIN."""
     boundary = np.array([_BOUNDARIES[name] for name in scene.world.boundary])
     gravity = np.array(scene.world.gravity, dtype=np.float64)
-    loses = min([scene.world.restitution, *(g.restitution for g in scene.particles if g.restitution is not None)]) < 1.0
-    return World(
-        lower=-half,
-        upper=half,
-        boundary=boundary,
-        period=np.where(boundary == PERIODIC, 2.0 * half, 0.0),
-        gravity=gravity,
-        restitution=float(scene.world.restitution),
-        # The same fraction of the speed of a fall through the world.
-        still=APPROACH_TOLERANCE * float(np.sqrt(2.0 * np.abs(gravity) @ scene.world.size)),
-        sinking=RESTING_PENETRATION_SLOP if gravity.any() and loses else PENETRATION_SLOP,
-    )
+    return make_domain(np.array(scene.world.size), boundary, gravity)
+
+
+def space_of(domain: np.ndarray) -> Space:
+    """A domain as placing takes it."""
+    return Space(*(domain[0][name].copy() for name in ("lower", "upper", "boundary", "period")))
 
 
 def _key(group: int, key: str) -> str:
@@ -134,9 +152,10 @@ def _sizes(group: Group, random: np.random.Generator) -> np.ndarray:
     return np.exp(random.uniform(math.log(group.size.low), math.log(group.size.high), group.number))
 
 
-def _constants(
+def _particles(
     scene: Scene, shapes: list[Shape], shape_of_group: list[int], randoms: list[np.random.Generator]
-) -> Constants:
+) -> np.ndarray:
+    """The particles of a scene, (n,) BODY, not placed yet."""
     counts = [group.number for group in scene.particles]
     group_of = np.repeat(np.arange(len(counts)), counts)
     shape = np.array(shape_of_group)[group_of]
@@ -145,9 +164,7 @@ def _constants(
     density = np.array([_DEFAULT_DENSITY if g.density is None else g.density for g in scene.particles])[group_of]
     mass = np.array([math.nan if g.mass is None else g.mass for g in scene.particles])[group_of]
     density = np.where(np.isnan(mass), density, mass / volume)
-    usual = scene.world.restitution
-    restitution = np.array([usual if g.restitution is None else g.restitution for g in scene.particles])
-    return particle_constants(shapes, shape, group_of, size, density, restitution[group_of])
+    return make_particles(shapes, shape, group_of, size, density)
 
 
 def check_memory(particles: int) -> None:
@@ -169,30 +186,30 @@ def _memory() -> float:
         return machine
 
 
-def _check_sizes(scene: Scene, world: World, constants: Constants) -> None:
-    """Walls must leave room, and a particle must not meet itself round a periodic world."""
+def _check_sizes(scene: Scene, domain: np.void, particles: np.ndarray) -> None:
+    """Walls must leave room, and a particle must not meet itself round a periodic domain."""
     for g, group in enumerate(scene.particles):
-        members = constants.group == g
+        members = particles["group"] == g
         value = group.size.value if isinstance(group.size, FixedSize) else None
-        widest = 2.0 * constants.radius[members].max(initial=0.0)
-        narrowest = 2.0 * constants.inradius[members].max(initial=0.0)
-        for axis, edge in enumerate(world.upper - world.lower):
-            if world.boundary[axis] == PERIODIC and widest >= 0.5 * edge:
+        widest = 2.0 * particles["radius"][members].max(initial=0.0)
+        narrowest = 2.0 * particles["inradius"][members].max(initial=0.0)
+        for axis, edge in enumerate(domain["upper"] - domain["lower"]):
+            if domain["boundary"][axis] == PERIODIC and widest >= 0.5 * edge:
                 message = (
                     f"too large: particles span {widest:.4g} m; "
                     f"in a periodic world they must span less than half of it, {0.5 * edge:.4g} m"
                 )
                 raise SceneError(message, _key(g, "size"), value)
-            if world.boundary[axis] == WALL and narrowest > edge:
+            if domain["boundary"][axis] == WALL and narrowest > edge:
                 message = f"too large: particles are {narrowest:.4g} m thick, between walls {edge:.4g} m apart"
                 raise SceneError(message, _key(g, "size"), value)
 
 
-def _check_volume(scene: Scene, world: World, shapes: list[Shape], constants: Constants) -> None:
+def _check_volume(scene: Scene, domain: np.void, shapes: list[Shape], particles: np.ndarray) -> None:
     """What is enclosed must have room."""
-    volumes = np.array([s.volume for s in shapes])[constants.shape] * constants.size**3
-    fill = float(volumes.sum() / (world.upper - world.lower).prod())
-    if fill > 1.0 and not (world.boundary == OPEN).any():
+    volumes = np.array([s.volume for s in shapes])[particles["shape_row"]] * particles["scale"] ** 3
+    fill = float(volumes.sum() / (domain["upper"] - domain["lower"]).prod())
+    if fill > 1.0 and not (domain["boundary"] == OPEN).any():
         raise SceneError(f"do not fit: their volumes add up to {fill:.3g} times the world's", "particles")
 
 
@@ -213,7 +230,7 @@ def _turned(q: np.ndarray, into: np.ndarray) -> np.ndarray:
 
 
 def _orientations(
-    scene: Scene, shapes: list[Shape], constants: Constants, randoms: list[np.random.Generator]
+    scene: Scene, shapes: list[Shape], particles: np.ndarray, randoms: list[np.random.Generator]
 ) -> np.ndarray:
     """Orientations of all particles, (n, 4)."""
     parts = [np.zeros((0, 4))]
@@ -225,44 +242,40 @@ def _orientations(
             q = random_quaternions(random, group.number)
         else:
             q = np.tile(_quaternion(group.orientation), (group.number, 1))
-        frame = shapes[int(constants.shape[constants.group == g][0])].orientation if group.number else None
+        frame = shapes[int(particles["shape_row"][particles["group"] == g][0])].orientation if group.number else None
         if frame is not None and frame[0] != 1.0 and (listed or group.orientation != "random"):
             q = _turned(q, frame)
         parts.append(q)
     return np.ascontiguousarray(np.concatenate(parts))
 
 
-def _check_apart(scene: Scene, table: ShapeTable, world: World, constants: Constants, state: State) -> None:
+def _check_apart(scene: Scene, system: System) -> None:
     """No particle may start inside another or outside a wall; touching is allowed."""
-    reach = constants.radius[:, None]
-    pairs = find_pairs(state.position - reach, state.position + reach, period=world.period)
-    points = np.empty((MAX_MANIFOLD, 3))
-    for contacts in (
-        touching_walls(table, world, constants, state),
-        touching_pairs(table, world, constants, state, pairs),
-    ):
+    bounded = system.body[: system.bounded]
+    reach = bounded["radius"][:, None]
+    pairs = find_pairs(bounded["position"] - reach, bounded["position"] + reach, period=system.domain[0]["period"])
+    for contacts in (touching_half_spaces(system), touching_pairs(system, pairs)):
         for i, j in contacts.tolist():
-            separation, _, _, _ = contact_now(table, world, constants, state, i, j, points)
-            if separation < -_TOLERATED_OVERLAP * constants.radius[i]:
+            separation = separation_of(system, i, j)
+            if separation < -_TOLERATED_OVERLAP * system.body["radius"][i]:
                 deep = f"{-separation:.3g} m"
-                if j < 0:
-                    raise _start_error(
-                        scene, constants, i, f"sticks {deep} through the {WALL_NAMES[wall_of_partner(j)]} wall"
-                    )
-                g, k = _place_in_group(constants, j)
-                raise _start_error(scene, constants, i, f"starts {deep} inside particle {k} of particles[{g}]")
+                if j >= system.bounded:
+                    wall = WALL_NAMES[system.body["wall"][j]]
+                    raise _start_error(scene, system.body, i, f"sticks {deep} through the {wall} wall")
+                g, k = _place_in_group(system.body, j)
+                raise _start_error(scene, system.body, i, f"starts {deep} inside particle {k} of particles[{g}]")
 
 
-def _start_error(scene: Scene, constants: Constants, i: int, wrong: str) -> SceneError:
+def _start_error(scene: Scene, body: np.ndarray, i: int, wrong: str) -> SceneError:
     """What is wrong with where particle ``i`` starts, said of what put it there."""
-    g, k = _place_in_group(constants, i)
+    g, k = _place_in_group(body, i)
     placement = scene.particles[g].placement
     if isinstance(placement, ListPlacement):
         return SceneError(wrong, _key(g, f"placement.poses[{k}].position"), placement.poses[k].position)
     return SceneError(f"particle {k} {wrong}", _key(g, "placement"))
 
 
-def _place_in_group(constants: Constants, i: int) -> tuple[int, int]:
+def _place_in_group(body: np.ndarray, i: int) -> tuple[int, int]:
     """Group of particle ``i`` and its number there."""
-    g = int(constants.group[i])
-    return g, i - int(np.searchsorted(constants.group, g))
+    g = int(body["group"][i])
+    return g, i - int(np.flatnonzero(body["group"] == g)[0])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.core.rotations import rotations_of
-from particlesim.model.bodies import Constants, State
 from particlesim.scene import Scene
 from particlesim.scene.groups import (
     FixedVelocity,
@@ -25,26 +24,15 @@ def random_quaternions(random: np.random.Generator, count: int) -> np.ndarray:
     return q / np.linalg.norm(q, axis=1, keepdims=True)
 
 
-def initial_state(
-    scene: Scene,
-    constants: Constants,
-    position: np.ndarray,
-    orientation: np.ndarray,
-    randoms: list[np.random.Generator],
-) -> State:
-    """The state in which all particles of a scene start."""
-    velocity, momentum = np.zeros_like(position), np.zeros_like(position)
+def set_in_motion(scene: Scene, bodies: np.ndarray, randoms: list[np.random.Generator]) -> None:
+    """Give particles (n,) BODY, which stand where they start, the velocities and spins that their groups say."""
     for g, (group, random) in enumerate(zip(scene.particles, randoms, strict=True)):
-        members = constants.group == g
-        velocity[members] = _velocities(group, position[members], constants.mass[members], random)
-        momentum[members] = _angular_momenta(group, orientation[members], constants.inertia[members], random)
-    return State(
-        position=position,
-        orientation=orientation,
-        velocity=velocity,
-        angular_momentum=momentum,
-        image=np.zeros(position.shape, dtype=np.int64),
-    )
+        members = bodies["group"] == g
+        own = bodies[members]
+        bodies["velocity"][members] = _velocities(group, own["position"], own["mass"], random)
+        bodies["angular_momentum"][members] = _angular_momenta(
+            group, own["orientation"], own["principal_inertia"], random
+        )
 
 
 def _directions(random: np.random.Generator, count: int) -> np.ndarray:

@@ -8,7 +8,6 @@ import numpy as np
 
 from particlesim.geometry.aabb import aabbs_of
 from particlesim.geometry.shape_table import ShapeTable
-from particlesim.model.bodies import Constants, World
 from particlesim.scene import Scene
 from particlesim.scene.file import SceneError
 from particlesim.scene.groups import (
@@ -20,6 +19,7 @@ from particlesim.scene.groups import (
     Region,
 )
 from particlesim.setup.random_insertion import Insertion, empty_space, refile, try_in_place
+from particlesim.setup.space import Crowd, Space
 
 # Random trials a particle before it is said not to fit. Equal spheres jam at a fill of 0.38 (J. Feder, J. Theor. Biol.
 # 87 (1980) 237-254); a fill of 0.3 takes the last of 10^5 of them 6000.
@@ -38,8 +38,8 @@ _PLACED_BY_DOUBLING = 1.0 / 6.0
 def positions(
     scene: Scene,
     table: ShapeTable,
-    world: World,
-    constants: Constants,
+    world: Space,
+    crowd: Crowd,
     orientation: np.ndarray,
     randoms: list[np.random.Generator],
 ) -> np.ndarray:
@@ -47,10 +47,10 @@ def positions(
 
     Lists and lattices come first; the rest is put between them at random, the largest particles first.
     """
-    insertion = empty_space(constants, world, orientation)
+    insertion = empty_space(crowd, world, orientation)
     position, level = insertion.body["position"], insertion.body["level"]
-    below, above = aabbs_of(table, constants.shape, constants.size, orientation)
-    groups = [np.flatnonzero(constants.group == g) for g in range(len(scene.particles))]
+    below, above = aabbs_of(table, crowd.shape, crowd.size, orientation)
+    groups = [np.flatnonzero(crowd.group == g) for g in range(len(scene.particles))]
     for g, (group, members) in enumerate(zip(scene.particles, groups, strict=True)):
         if isinstance(group.placement, ListPlacement):
             position[members] = [pose.position for pose in group.placement.poses]
@@ -62,7 +62,7 @@ def positions(
         for g, (group, members) in enumerate(zip(scene.particles, groups, strict=True))
         if isinstance(group.placement, RandomPlacement | ClusterPlacement) and len(members)
     }
-    in_place = np.flatnonzero(~np.isin(constants.group, list(inserted)))
+    in_place = np.flatnonzero(~np.isin(crowd.group, list(inserted)))
     for number in range(len(insertion.level) - 1, -1, -1):
         if (level[in_place] < number).any() or number == len(insertion.level) - 1:
             refile(insertion, in_place, number)
@@ -96,7 +96,7 @@ def _no_room(g: int, group: Group, left: int) -> SceneError:
     return SceneError(message, f"particles[{g}].count", group.number)
 
 
-def _bounds(region: Region | None, world: World) -> tuple[np.ndarray, np.ndarray]:
+def _bounds(region: Region | None, world: Space) -> tuple[np.ndarray, np.ndarray]:
     if region is None:
         return world.lower, world.upper
     return np.array(region.lower), np.array(region.upper)
@@ -127,7 +127,7 @@ def lattice_points(lower: np.ndarray, upper: np.ndarray, count: int, spacing: fl
 def _on_lattice(
     g: int,
     lattice: LatticePlacement,
-    world: World,
+    world: Space,
     count: int,
     extent: np.ndarray,
     random: np.random.Generator,
@@ -223,7 +223,7 @@ class _Trials:
         self,
         g: int,
         where: RandomPlacement | ClusterPlacement,
-        world: World,
+        world: Space,
         extent: tuple[np.ndarray, np.ndarray],
         members: np.ndarray,
         random: np.random.Generator,

@@ -13,33 +13,36 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.core.constants import MAX_MANIFOLD, SPHERE
-from particlesim.core.jit import kernel, without_refcounts
-from particlesim.core.math3d import dot, sub, to_vec3
-from particlesim.geometry.narrow_phase.pair import nearest_image, pair_overlaps
-from particlesim.model.bodies import Constants, World
+from particlesim.core.constants import MAX_MANIFOLD
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
+from particlesim.core.math3d import dot, sub, to_quat, to_vec3
+from particlesim.core.records import record
+from particlesim.geometry.narrow_phase.pair import pair_overlaps
+from particlesim.geometry.support import is_sphere
+from particlesim.model.domain import nearest_image
+from particlesim.setup.space import Crowd, Space
 
 # Cells along an axis: enough for any number of particles, few enough for whole numbers.
 _MOST_CELLS = 2**20
 
 # A particle that is in place, or waits to be.
-INSERTED = np.dtype(
+INSERTED = record(
     [
         ("position", "f8", (3,)),  # [m]
         ("radius", "f8"),  # bounding sphere [m]
         ("next", "i8"),  # in its bucket, -1 if none
-        ("shape", "i8"),
-        ("size", "f8"),
+        ("shape_row", "i8"),
+        ("scale", "f8"),
         ("level", "i8"),  # of its size: particles of one level differ by less than a factor of 2
         ("orientation", "f8", (4,)),
     ]
 )
 
 # The cells of one level of sizes.
-LEVEL = np.dtype([("cells", "i8", (3,)), ("in_place", "i8")])
+LEVEL = record([("cells", "i8", (3,)), ("in_place", "i8")])
 
 # The space that is filled.
-SPACE = np.dtype([("lower", "f8", (3,)), ("upper", "f8", (3,)), ("period", "f8", (3,))])
+SPACE = record([("lower", "f8", (3,)), ("upper", "f8", (3,)), ("period", "f8", (3,))])
 
 
 class Insertion(NamedTuple):
@@ -57,19 +60,19 @@ def levels_of(radius: np.ndarray) -> np.ndarray:
     return ((np.bincount(octave) > 0).cumsum() - 1)[octave]
 
 
-def empty_space(constants: Constants, world: World, orientation: np.ndarray) -> Insertion:
-    """A world without particles yet, made for particles of these sizes and orientations (n, 4)."""
-    total = len(constants.radius)
-    space, body = np.zeros(1, dtype=SPACE), np.zeros(total, dtype=INSERTED)
-    space["lower"], space["upper"], space["period"] = world.lower, world.upper, world.period
-    body["orientation"], body["size"] = orientation, constants.size
-    body["radius"], body["shape"] = constants.radius, constants.shape
-    body["level"] = levels_of(constants.radius)
+def empty_space(crowd: Crowd, space: Space, orientation: np.ndarray) -> Insertion:
+    """A space without particles yet, made for particles of these sizes and orientations (n, 4)."""
+    total = len(crowd.radius)
+    extent, body = np.zeros(1, dtype=SPACE), np.zeros(total, dtype=INSERTED)
+    extent["lower"], extent["upper"], extent["period"] = space.lower, space.upper, space.period
+    body["orientation"], body["scale"] = orientation, crowd.size
+    body["radius"], body["shape_row"] = crowd.radius, crowd.shape
+    body["level"] = levels_of(crowd.radius)
     level = np.zeros(body["level"].max(initial=-1) + 1, dtype=LEVEL)
     widths = np.zeros(len(level))
-    np.maximum.at(widths, body["level"], 2.0 * constants.radius)
-    level["cells"] = np.clip(np.floor((world.upper - world.lower) / widths[:, None]), 1.0, _MOST_CELLS)
-    return Insertion(space, body, level, np.full(1 << (2 * total).bit_length(), -1, dtype=np.int64))
+    np.maximum.at(widths, body["level"], 2.0 * crowd.radius)
+    level["cells"] = np.clip(np.floor((space.upper - space.lower) / widths[:, None]), 1.0, _MOST_CELLS)
+    return Insertion(extent, body, level, np.full(1 << (2 * total).bit_length(), -1, dtype=np.int64))
 
 
 @kernel
@@ -128,7 +131,7 @@ def _file(insertion, i, number):
     level[number].in_place += 1
 
 
-@kernel
+@entry_kernel
 def refile(insertion, indices, number):
     """Find the particles ``indices`` (m,), all that are in place, by the cells of their level or of ``number``.
 
@@ -144,20 +147,10 @@ def refile(insertion, indices, number):
 @kernel
 def _overlap(table, a, b, offset, points):
     """Whether two particles whose bounding spheres overlap do; the centroid of b is at ``offset`` from that of a."""
-    if table.kind[a.shape] == SPHERE and table.kind[b.shape] == SPHERE:
+    if is_sphere(table, a.shape_row) and is_sphere(table, b.shape_row):
         return True
-    own, other = a.orientation, b.orientation
-    return pair_overlaps(
-        table,
-        a.shape,
-        a.size,
-        (own[0], own[1], own[2], own[3]),
-        b.shape,
-        b.size,
-        (other[0], other[1], other[2], other[3]),
-        offset,
-        points,
-    )
+    placed_a, placed_b = (a.shape_row, a.scale, to_quat(a.orientation)), (b.shape_row, b.scale, to_quat(b.orientation))
+    return pair_overlaps(table, placed_a, placed_b, offset, points)
 
 
 @kernel
@@ -208,7 +201,7 @@ def _overlaps_any(table, insertion, i, point, points):
     return False
 
 
-@kernel
+@entry_kernel
 def try_in_place(table, insertion, indices, proposals):
     """Put each particle of ``indices`` (m,), all of one level, at the first of its ``proposals`` where it is free.
 

@@ -33,7 +33,7 @@ def estimate(scene: Scene) -> list[tuple[str, str]]:
 
 def _particle_rows(simulation: Simulation) -> list[tuple[str, str]]:
     """How many particles there are in all and in each group, with their shape, sizes and mass."""
-    constants, groups = simulation.constants, simulation.scene.particles
+    constants, groups = simulation.particles, simulation.scene.particles
     rows = [("particles", f"{len(constants.size):,}")]
     for g, group in enumerate(groups):
         members = np.flatnonzero(constants.group == g)
@@ -42,16 +42,16 @@ def _particle_rows(simulation: Simulation) -> list[tuple[str, str]]:
 
 
 def _group(simulation: Simulation, members: np.ndarray) -> str:
-    constants = simulation.constants
-    shape, sizes = simulation.shapes[int(constants.shape[members[0]])], constants.size[members]
+    constants = simulation.particles
+    shape, sizes = simulation.model.shapes[int(constants.shape[members[0]])], constants.size[members]
     span = f"{sizes.min():g}" if sizes.min() == sizes.max() else f"{sizes.min():g} to {sizes.max():g}"
     return f"{len(members):,} x {shape.name}, size {span}, mass {constants.mass[members].sum():.4g} kg"
 
 
 def _volume(simulation: Simulation) -> float:
     """Of all particles [m^3]."""
-    constants = simulation.constants
-    volumes = np.array([shape.volume for shape in simulation.shapes])
+    constants = simulation.particles
+    volumes = np.array([shape.volume for shape in simulation.model.shapes])
     return float((volumes[constants.shape] * constants.size**3).sum()) if len(constants.size) else 0.0
 
 

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 
 from particlesim.broad_phase import METHODS
-from particlesim.core.constants import STEP_FRACTION
-from particlesim.core.parallel import use_threads
-from particlesim.dynamics import Flight
-from particlesim.model.bodies import Particles
-from particlesim.model.free_motion import spins
-from particlesim.model.touching import deepest_overlap
+from particlesim.core.parallel import limit_threads
+from particlesim.dynamics.settings import STEP_DISPLACEMENT
+from particlesim.dynamics.solver import Solver
+from particlesim.dynamics.solver_state import SolverState, digest
+from particlesim.model.bodies import Particles, angular_velocities
+from particlesim.model.overlap import deepest_overlap
+from particlesim.model.system import Model
 from particlesim.scene import Scene
 from particlesim.setup.build import build
-from particlesim.simulation.diagnostics import sums
+from particlesim.simulation.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
+from particlesim.simulation.conserved import conserved
 from particlesim.trajectory.frames import Frame, Header, Ledger
 
 
@@ -33,23 +36,78 @@ class Simulation:
     """
 
     def __init__(self, scene: Scene, broad_phase: str | None = None, threads: int | None = None) -> None:
-        use_threads(threads)
-        self._threads = threads
-        self.scene = scene
-        self.shapes, self.table, self.world, self.constants, self.state = build(scene)
+        with limit_threads(threads):
+            self._begin(scene, build(scene), broad_phase, threads)
+
+    @classmethod
+    def of_model(
+        cls, scene: Scene, model: Model, broad_phase: str | None = None, threads: int | None = None
+    ) -> Simulation:
+        """A simulation of a model that was built from ``scene`` and changed, such as by obstacles."""
+        simulation = cls.__new__(cls)
+        with limit_threads(threads):
+            simulation._begin(scene, model, broad_phase, threads)
+        return simulation
+
+    def _begin(
+        self, scene: Scene, model: Model, broad_phase: str | None, threads: int | None, state: SolverState | None = None
+    ) -> None:
+        """Start from a model, or go on from a solver state."""
+        self.scene, self._threads = scene, threads
         chosen = scene.solver.broad_phase
         if broad_phase not in (None, *METHODS):
             raise ValueError(f"unknown broad phase '{broad_phase}'; there are {', '.join(METHODS)}")
-        self._find_pairs = METHODS[broad_phase or chosen.kind]
-        self._parameters = chosen.model_dump(exclude={"kind"}) if broad_phase in (None, chosen.kind) else {}
+        self.broad_phase = broad_phase or chosen.kind
+        parameters = chosen.model_dump(exclude={"kind"}) if broad_phase in (None, chosen.kind) else {}
         self._frame_time = scene.time_of(1)
-        self._flight = Flight(self.table, self.world, self.constants, self.state, self._candidate_pairs)
+        self._solver = Solver(model, partial(METHODS[self.broad_phase], **parameters), state)
         self.steps = 0
-        self.time = 0.0
         self.time_step = self.next_time_step()
 
-    def _candidate_pairs(self, lower: np.ndarray, upper: np.ndarray, period: np.ndarray) -> tuple[np.ndarray, int]:
-        return self._find_pairs(lower, upper, period, **self._parameters)
+    # ---- checkpoints -------------------------------------------------------------------------------------------------
+
+    def save(self, path: str | Path) -> None:
+        """Write a checkpoint (NPZ): the model and everything that the next step depends on.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, which appears whole or not at all.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
+        """
+        done = {"steps": self.steps, "time_step": self.time_step, "broad_phase": self.broad_phase}
+        write_checkpoint(path, Checkpoint(self.scene, self.model, self._solver.state, self._solver.counts, done))
+
+    @classmethod
+    def load(cls, path: str | Path, broad_phase: str | None = None, threads: int | None = None) -> Simulation:
+        """Go on from a checkpoint: the same bytes as if the simulation had never been interrupted.
+
+        Parameters
+        ----------
+        path : str or Path
+            A file that ``save`` wrote.
+        broad_phase, threads
+            As for Simulation; neither changes the result.
+
+        Raises
+        ------
+        CheckpointError
+            If the file is not a checkpoint, is damaged, or is one of another version.
+        OSError
+            If it cannot be read.
+        """
+        found = read_checkpoint(path)
+        simulation = cls.__new__(cls)
+        chosen = found.done["broad_phase"] if broad_phase is None else broad_phase
+        with limit_threads(threads):
+            simulation._begin(found.scene, found.model, chosen, threads, found.state)
+        simulation._solver.counts = found.counts
+        simulation.steps, simulation.time_step = found.done["steps"], found.done["time_step"]
+        return simulation
 
     # ---- going forward -------------------------------------------------------------------------------------------
 
@@ -70,7 +128,7 @@ class Simulation:
             parts = math.ceil(left / self.next_time_step() - 1e-9)
             self.step(left / max(parts, 1))
             if parts <= 1:
-                self.time = end
+                self._solver.state.time = end
 
     def next_time_step(self) -> float:
         """The scene's time step, or one in which particles move a little (STEP_FRACTION); at most one frame [s].
@@ -79,33 +137,54 @@ class Simulation:
         """
         if self.scene.solver.time_step != "auto":
             return self.scene.solver.time_step
-        return min(self._flight.longest_stretch(STEP_FRACTION), self._frame_time)
+        return min(self._solver.longest_substep(STEP_DISPLACEMENT), self._frame_time)
 
     def step(self, time_step: float | None = None) -> None:
         """One time step [s], the automatic one if not given."""
-        use_threads(self._threads)
-        self.time_step = self.next_time_step() if time_step is None else time_step
-        self._flight.advance(self.time_step)
-        self.time += self.time_step
+        with limit_threads(self._threads):
+            self.time_step = self.next_time_step() if time_step is None else time_step
+            self._solver.step(self.time_step)
         self.steps += 1
 
     # ---- looking ---------------------------------------------------------------------------------------------------
 
     @property
+    def model(self) -> Model:
+        """What is simulated, as arrays."""
+        return self._solver.model
+
+    @property
+    def time(self) -> float:
+        """Time since the start of the scene [s]."""
+        return self._solver.state.time
+
+    @property
     def particles(self) -> Particles:
-        """Constants and state side by side (see Particles): views of the arrays, but for the angular velocity."""
+        """The dynamic bodies (see Particles): views of their records, but for what is computed from them."""
+        b, system = self.model.particles, self.model.system
         return Particles(
-            *self.constants,
-            *self.state,
-            angular_velocity=spins(self.constants, self.state),
-            impacts=self._flight.counts.each,
+            shape=b["shape_row"],
+            group=b["group"],
+            size=b["scale"],
+            mass=b["mass"],
+            inertia=b["principal_inertia"],
+            restitution=self.model.restitution[b["material"]],
+            radius=b["radius"],
+            inradius=b["inradius"],
+            position=b["position"],
+            orientation=b["orientation"],
+            velocity=b["velocity"],
+            angular_momentum=b["angular_momentum"],
+            image=b["image"],
+            angular_velocity=angular_velocities(system.body, system.particles),
+            impacts=self._solver.counts.each,
         )
 
     @property
     def ledger(self) -> Ledger:
         """Sums over all particles now, and counts since the start."""
-        counts = self._flight.counts
-        (translational, rotational, potential), momentum, angular = sums(self.world, self.constants, self.state)
+        counts = self._solver.counts
+        (translational, rotational, potential), momentum, angular = conserved(self.model.system)
         return Ledger(
             time=self.time,
             time_step=self.time_step,
@@ -124,48 +203,54 @@ class Simulation:
         )
 
     def largest_overlap(self) -> float:
-        """The largest overlap of two particles, or of a particle and a wall, now [m]."""
-        return float(deepest_overlap(self.table, self.world, self.constants, self.state, self._flight.pairs))
+        """The largest overlap of two bodies now [m]; 0 if nothing overlaps. It looks at every pair of neighbours."""
+        return deepest_overlap(self.model.system, self._solver.pairs)
 
     @property
     def seconds(self) -> dict[str, float]:
         """Wall-clock time [s] spent so far on pairs, contacts, respond and advance."""
-        return dict(self._flight.seconds)
+        return dict(self._solver.seconds)
 
     @property
     def header(self) -> Header:
         """What stays the same from frame to frame."""
-        c = self.constants
-        return Header(self.scene.model_dump_json(), self.shapes, c.shape, c.size, c.group, c.mass, c.inertia)
+        b = self.model.particles
+        return Header(
+            self.scene.model_dump_json(),
+            self.model.shapes,
+            b["shape_row"].astype(np.int64),
+            b["scale"].copy(),
+            b["group"].astype(np.int64),
+            b["mass"].copy(),
+            b["principal_inertia"].copy(),
+        )
 
     def frame(self) -> Frame:
         """The present moment, copied. SimulationError if a number in it is not finite."""
         self._check_finite()
-        state = self.state
+        b = self.model.particles
         return Frame(
             time=self.time,
-            position=state.position.copy(),
-            orientation=state.orientation.copy(),
-            velocity=state.velocity.copy(),
-            angular_momentum=state.angular_momentum.copy(),
-            image=state.image.copy(),
-            impacts=self._flight.counts.each.copy(),
+            position=b["position"].copy(),
+            orientation=b["orientation"].copy(),
+            velocity=b["velocity"].copy(),
+            angular_momentum=b["angular_momentum"].copy(),
+            image=b["image"].astype(np.int64),
+            impacts=self._solver.counts.each.copy(),
             ledger=replace(self.ledger, largest_overlap=self.largest_overlap()),
         )
 
     def state_hash(self) -> str:
-        """SHA-256 of the raw state: two runs that agree in it agree in every bit."""
-        digest = hashlib.sha256()
-        for array in self.state:
-            digest.update(np.ascontiguousarray(array).tobytes())
-        return digest.hexdigest()
+        """SHA-256 of everything that the next step depends on: two runs that agree in it go on the same to the bit."""
+        system = self.model.system
+        return digest(system.body, system.law, system.motion, system.domain, *self._solver.state.arrays().values())
 
     def _check_finite(self) -> None:
-        for name, array in zip(self.state._fields, self.state, strict=True):
-            bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+        b = self.model.particles
+        for name in ("position", "orientation", "velocity", "angular_momentum"):
+            bad = np.flatnonzero(~np.isfinite(b[name]).all(axis=1))
             if len(bad):
                 i = int(bad[0])
-                group = int(self.constants.group[i])
                 raise SimulationError(
-                    f"{name} of particle {i} (particles[{group}] of the scene) is not finite at {self.time:g} s"
+                    f"{name} of particle {i} (particles[{b['group'][i]}] of the scene) is not finite at {self.time:g} s"
                 )

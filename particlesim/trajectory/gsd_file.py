@@ -20,9 +20,9 @@ import gsd.hoomd
 import numpy as np
 
 from particlesim.core.atomic_write import atomic_write
-from particlesim.core.constants import SPHERE
+from particlesim.core.constants import CAPSULE, SPHERE
 from particlesim.core.rotations import conjugates, quaternion_products
-from particlesim.geometry.shapes import Shape, hull, sphere
+from particlesim.geometry.shapes import Shape, capsule, hull, sphere
 from particlesim.scene import Scene
 from particlesim.scene.file import parse_scene
 from particlesim.trajectory.frames import Frame, Header, Ledger
@@ -37,6 +37,11 @@ _MAX_SIZES = 64
 _LOG = "log/particlesim/"
 _LEDGER = _LOG + "ledger/"
 _IMPACTS = "log/particles/impacts"
+
+# Sides of the prism that stands for a capsule in other programs, and its radius as a fraction of the capsule's: the
+# outline is off by 0.2 %.
+_PRISM_SIDES = 16
+_PRISM_RADIUS = 1e-3
 
 # Quantities of a particle, with what stands for those that are not in the file (the schema's defaults).
 _DEFAULTS: dict[str, tuple[float, ...]] = {
@@ -183,7 +188,7 @@ def _display_types(header: Header) -> tuple[list[tuple[str, dict[str, Any]]], np
 
 
 def _display_diameters(header: Header) -> np.ndarray:
-    """Diameters of spheres, (n,) float32 [m], and 2 for hulls, whose vertices OVITO stretches by half of it."""
+    """Diameters of spheres, (n,) float32 [m], and 2 for others, whose shape OVITO stretches by half of it."""
     spheres = np.array([shape.kind == SPHERE for shape in header.shapes])[header.shape]
     return np.where(spheres, header.size, 2.0).astype(np.float32)
 
@@ -199,12 +204,31 @@ def _size_classes(size: np.ndarray) -> list[np.ndarray]:
 def _gsd_shape(shape: Shape, size: float) -> dict[str, Any]:
     if shape.kind == SPHERE:
         return {"type": "Sphere", "diameter": size}
-    return {"type": "ConvexPolyhedron", "rounding_radius": 0.0, "vertices": (shape.vertices * size).tolist()}
+    core, rounding = shape.vertices, shape.rounding
+    if shape.kind == CAPSULE:
+        core, rounding = _thin_prism(shape)
+    return {"type": "ConvexPolyhedron", "rounding_radius": rounding * size, "vertices": (core * size).tolist()}
+
+
+def _thin_prism(shape: Shape) -> tuple[np.ndarray, float]:
+    """Vertices and rounding of a thin prism that looks like a capsule: the core of a polyhedron must enclose volume.
+
+    OVITO draws one flat face for every edge of a rounded polyhedron, so the prism has many.
+    """
+    thin = _PRISM_RADIUS * shape.rounding
+    angle = 2.0 * np.pi / _PRISM_SIDES * np.arange(_PRISM_SIDES)
+    ring = thin * np.stack([np.cos(angle), np.sin(angle), np.zeros(_PRISM_SIDES)], axis=1)
+    return np.concatenate([end + ring for end in shape.vertices]), shape.rounding - thin
 
 
 def _header_log(header: Header) -> dict[str, np.ndarray]:
     shapes = [
-        {"name": s.name, "kind": s.kind, "vertices": s.vertices.tolist(), "orientation": s.orientation.tolist()}
+        {
+            "name": s.name,
+            "vertices": s.vertices.tolist(),
+            "rounding": s.rounding,
+            "orientation": s.orientation.tolist(),
+        }
         for s in header.shapes
     ]
     return {
@@ -221,13 +245,23 @@ def _read_header(chunks: Chunks) -> Header:
     shape = chunks.read(_LOG + "shape").astype(np.int64)
     return Header(
         scene_json=chunks.read(_LOG + "scene").tobytes().decode(),
-        shapes=tuple(sphere() if s["kind"] == SPHERE else hull(s["name"], s["vertices"]) for s in described),
+        shapes=tuple(_read_shape(s) for s in described),
         shape=shape,
         size=chunks.rows(_LOG + "size", len(shape), (1.0,))[:, 0],
         group=chunks.rows(_LOG + "group", len(shape), (0.0,))[:, 0].astype(np.int64),
         mass=chunks.rows("particles/mass", len(shape), (1.0,))[:, 0],
         inertia=chunks.rows("particles/moment_inertia", len(shape), (0.0, 0.0, 0.0)),
     )
+
+
+def _read_shape(described: dict[str, Any]) -> Shape:
+    """A shape from what _header_log says of it: its core is a point, a segment or a polyhedron."""
+    vertices = described["vertices"]
+    if len(vertices) < 2:
+        return sphere()
+    if len(vertices) == 2:
+        return capsule(vertices[1][2] - vertices[0][2])
+    return hull(described["name"], vertices, described.get("rounding", 0.0))
 
 
 def _checked(header: Header) -> Header:

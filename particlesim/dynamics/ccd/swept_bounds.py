@@ -1,8 +1,9 @@
-"""The first look at all pairs: spheres are told by the closed form, most others by their bounding spheres.
+"""Swept-sphere culling: the first look at all neighbouring pairs.
 
-Every particle has a ball that it cannot leave within the stretch of time, whatever it meets: about where it starts, as
-much larger than its bounding sphere as it goes. The balls lie in the order of the places, so that those of neighbours
-are in the cache, and nine of ten pairs need no more than them.
+Every body has a swept bound that it cannot leave within the substep, whatever strikes it: a sphere about where it
+starts, as much larger than its bounding sphere as it goes. The bounds lie in the order of the space-filling curve, so
+that those of neighbours are in the cache, and nine of ten pairs need no more than them. Spheres on free paths are told
+by the closed form.
 """
 
 from __future__ import annotations
@@ -11,128 +12,182 @@ import math
 
 import numpy as np
 
-from particlesim.core.constants import SETTLES, SPHERE, WALL
-from particlesim.core.jit import kernel, without_refcounts
-from particlesim.core.math3d import dot, load_vec3, norm, sub
-from particlesim.dynamics.ccd.time_of_impact import sphere_meets_wall, spheres_meet
-from particlesim.dynamics.neighbour_list import around_of, far_apart
-from particlesim.geometry.narrow_phase.pair import nearest_image
-from particlesim.model.touching import wall_as_partner
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
+from particlesim.core.math3d import dot, norm, scale, sub, to_vec3
+from particlesim.core.records import record
+from particlesim.dynamics.ccd.time_of_impact import sphere_half_space_impact, sphere_sphere_impact
+from particlesim.dynamics.standing import SETTLES
+from particlesim.geometry.support import half_space_plane, is_sphere
+from particlesim.model.bodies import KINEMATIC, STATIC, angular_velocity, placed
+from particlesim.model.domain import nearest_image
+from particlesim.model.free_motion import free_acceleration
+from particlesim.model.prescribed_motion import swing_acceleration
+
+BOUND = record(
+    [
+        ("position", "f8", (3,)),  # where the body starts [m]
+        ("reach", "f8"),  # radius of the swept bound [m]
+        ("velocity", "f8", (3,)),  # [m/s]
+        ("radius", "f8"),  # of the bounding sphere [m]
+    ]
+)
+
+# A pair that may collide: time of impact, or LOOK_CLOSER where more must be known.
+CANDIDATE = record([("i", "i8"), ("j", "i8"), ("slot", "i8"), ("time", "f8")])
+LOOK_CLOSER = -1.0
 
 
 @kernel
-def free_way(velocity, acceleration, time):
-    """How far a particle goes within ``time`` [s] at the most."""
-    return (norm(velocity) + 0.5 * norm(acceleration) * time) * time
+def free_displacement(velocity, acceleration, time):
+    """How far a particle goes within ``time`` [s] at most, from a velocity and the size of an acceleration."""
+    return (norm(velocity) + 0.5 * acceleration * time) * time
 
 
 @kernel
-def balls(radius, position, velocity, acceleration, place, duration, ball, first, last):
-    """Rows (n, 8) of ``ball``, by place, of particles ``first .. last`` that go straight on for ``duration`` [s].
+def largest_acceleration(system, b):
+    """The largest acceleration of a body's position on its present path [m/s^2]."""
+    largest = norm(free_acceleration(system, b))
+    if b.kind == KINEMATIC:
+        m = system.motion[b.motion]
+        largest += swing_acceleration((to_vec3(m.amplitude), m.angular_frequency, m.angle))
+    return largest
 
-    Position, radius of the ball, velocity, radius of the particle. Returns whether all accelerate as particle 0 does.
+
+@entry_kernel
+def write_bounds(system, place, duration, bound, first, last):
+    """Swept bounds, by place, of bodies ``first .. last`` that go on freely for ``duration`` [s].
+
+    Returns whether all of them are spheres that accelerate as body 0 does: nothing more need be known of them.
     """
-    radius, position, velocity, acceleration = without_refcounts((radius, position, velocity, acceleration))
-    place, ball = without_refcounts((place, ball))
-    pull = load_vec3(acceleration, 0)
+    system, place, bound = without_refcounts((system, place, bound))
+    common = free_acceleration(system, system.body[0])
     alike = True
     for i in range(first, last):
-        p = place[i]
-        own = load_vec3(acceleration, i)
-        alike = alike and own[0] == pull[0] and own[1] == pull[1] and own[2] == pull[2]
+        b, s = system.body[i], bound[place[i]]
+        alike = alike and b.kind != KINEMATIC and free_acceleration(system, b) == common
+        alike = alike and is_sphere(system.shapes, b.shape_row)
+        s.reach = b.radius + free_displacement(to_vec3(b.velocity), largest_acceleration(system, b), duration)
+        s.radius = b.radius
         for axis in range(3):
-            ball[p, axis] = position[i, axis]
-            ball[p, 4 + axis] = velocity[i, axis]
-        ball[p, 3] = radius[i] + free_way(load_vec3(velocity, i), own, duration)
-        ball[p, 7] = radius[i]
+            s.position[axis] = b.position[axis]
+            s.velocity[axis] = b.velocity[axis]
     return alike
 
 
-@kernel(inline=True)
-def _list(found, slots, times, count, i, j, slot, time):
-    found[count, 0] = i
-    found[count, 1] = j
-    slots[count] = slot
-    times[count] = time
-    return count + 1
+@kernel
+def inverse_period(period):
+    """Periods (3,) and their inverses, 0 on axes that do not wrap, as ``bounds_apart`` takes them."""
+    return (
+        (period[0], period[1], period[2]),
+        (
+            1.0 / period[0] if period[0] > 0.0 else 0.0,
+            1.0 / period[1] if period[1] > 0.0 else 0.0,
+            1.0 / period[2] if period[2] > 0.0 else 0.0,
+        ),
+    )
 
 
 @kernel
-def _pair_time(spheres, ball, p, q, period, duration):
-    """When the particles at two places meet that accelerate alike; -1 where that must be looked into."""
-    offset = nearest_image(sub(load_vec3(ball, q), load_vec3(ball, p)), period)
-    velocity = ball[q, 4] - ball[p, 4], ball[q, 5] - ball[p, 5], ball[q, 6] - ball[p, 6]
-    reach = ball[p, 7] + ball[q, 7]
-    time = spheres_meet(offset, velocity, reach, duration)
+def bounds_apart(a, b, periods):
+    """Whether two spheres (BOUND) have no point in common."""
+    period, inverse = periods
+    x, y, z = b.position[0] - a.position[0], b.position[1] - a.position[1], b.position[2] - a.position[2]
+    x -= period[0] * np.rint(x * inverse[0])
+    y -= period[1] * np.rint(y * inverse[1])
+    z -= period[2] * np.rint(z * inverse[2])
+    reach = a.reach + b.reach
+    return x * x + y * y + z * z > reach * reach
+
+
+@kernel
+def _impact_time(spheres, a, b, period, duration):
+    """When two bodies that accelerate alike collide, from their bounds; LOOK_CLOSER where that does not tell."""
+    offset = nearest_image(sub(to_vec3(b.position), to_vec3(a.position)), period)
+    velocity = sub(to_vec3(b.velocity), to_vec3(a.velocity))
+    reach = a.radius + b.radius
+    time = sphere_sphere_impact(offset, velocity, reach, duration)
     if time == 0.0 or (not spheres and (time < math.inf or dot(offset, offset) <= reach * reach)):
-        time = -1.0
+        time = LOOK_CLOSER
     return time
 
 
-@kernel
-def sieve(
-    kind, shape, acceleration, alike, ball, standing, particle, later_start, later, period, duration, first, last
-):  # fmt: skip
-    """Pairs (m, 2), i < j, of places ``first .. last`` with later neighbours that meet, or may, in ``duration`` [s].
+@entry_kernel
+def cull_pairs(system, neighbours, bound, standing, alike, duration, first, last):
+    """Neighbours of places ``first .. last`` that collide, or may, in ``duration`` [s], (m,) CANDIDATE.
 
-    And where they stand in ``later`` (m,), and times (m,): when they meet, or -1 where the bounding spheres come
-    together and more must be known. Where not all are known to accelerate ``alike``, it is looked at for each pair.
-    What settles together (see cluster.py) is not looked at.
+    Where not all bodies are known to be spheres that accelerate ``alike``, it is looked at for each pair. What settles
+    together (see active_set.py) is left out, and so are pairs without a particle.
     """
-    kind, shape, acceleration, ball, particle = without_refcounts((kind, shape, acceleration, ball, particle))
-    standing, later_start, later, period = without_refcounts((standing, later_start, later, period))
-    around = around_of(period)
-    most = later_start[last] - later_start[first]
-    found, slots = np.empty((most, 2), dtype=np.int64), np.empty(most, dtype=np.int64)
-    times = np.empty(most)
+    system, neighbours, bound, standing, alike = without_refcounts((system, neighbours, bound, standing, alike))
+    period = system.domain[0].period
+    periods = inverse_period(period)
+    found = np.empty(neighbours.later_start[last] - neighbours.later_start[first], dtype=CANDIDATE)
     count = 0
     for p in range(first, last):
-        for near in range(later_start[p], later_start[p + 1]):
-            q = later[near]
-            if far_apart(ball, p, q, around):
+        for slot in range(neighbours.later_start[p], neighbours.later_start[p + 1]):
+            q = neighbours.later[slot]
+            if bounds_apart(bound[p], bound[q], periods):
                 continue
-            one, two = (p, q) if particle[p] < particle[q] else (q, p)
-            i, j = particle[one], particle[two]
+            one, two = (p, q) if neighbours.body[p] < neighbours.body[q] else (q, p)
+            i, j = neighbours.body[one], neighbours.body[two]
             if standing[i] == SETTLES and standing[j] == SETTLES:
                 continue
-            pull = sub(load_vec3(acceleration, j), load_vec3(acceleration, i)) if not alike else (0.0, 0.0, 0.0)
-            time = -1.0
-            if pull[0] == 0.0 and pull[1] == 0.0 and pull[2] == 0.0:
-                spheres = kind[shape[i]] == SPHERE and kind[shape[j]] == SPHERE
-                time = _pair_time(spheres, ball, one, two, period, duration)
+            time = LOOK_CLOSER
+            if alike:
+                time = _impact_time(True, bound[one], bound[two], period, duration)
+            elif _accelerate_alike(system, system.body[i], system.body[j]):
+                spheres = _are_spheres(system.shapes, system.body[i], system.body[j])
+                time = _impact_time(spheres, bound[one], bound[two], period, duration)
             if time < math.inf:
-                count = _list(found, slots, times, count, i, j, near, time)
-    return found[:count], slots[:count], times[:count]
+                c = found[count]
+                c.i, c.j, c.slot, c.time = i, j, slot, time
+                count += 1
+    return found[:count]
 
 
 @kernel
-def sieve_walls(
-    kind, shape, radius, position, velocity, acceleration, standing, lower, upper, boundary, duration, first, last
-):  # fmt: skip
-    """As ``sieve``, of particles ``first .. last`` with walls, which are partners below 0 and stand nowhere: -1."""
-    kind, shape, radius, position, velocity, acceleration = without_refcounts(
-        (kind, shape, radius, position, velocity, acceleration)
-    )
-    standing = without_refcounts(standing)
-    most = 6 * (last - first)
-    found, slots = np.empty((most, 2), dtype=np.int64), np.empty(most, dtype=np.int64)
-    times = np.empty(most)
+def _accelerate_alike(system, a, b):
+    return b.kind != KINEMATIC and free_acceleration(system, a) == free_acceleration(system, b)
+
+
+@kernel
+def _are_spheres(shapes, a, b):
+    return is_sphere(shapes, a.shape_row) and is_sphere(shapes, b.shape_row)
+
+
+@kernel
+def _half_space_time(system, a, b, duration):
+    """When particle ``a`` meets half-space ``b``; LOOK_CLOSER where that is not told by its bounding sphere."""
+    inward = scale(half_space_plane(system.shapes, placed(b))[0], -1.0)
+    room = dot(inward, sub(to_vec3(b.position), to_vec3(a.position))) - a.radius
+    velocity, acceleration = sub(to_vec3(a.velocity), to_vec3(b.velocity)), free_acceleration(system, a)
+    if b.kind != STATIC:
+        # Turning or swinging, it is met sooner or later than a plane that only drifts.
+        if room <= free_displacement(velocity, norm(acceleration) + largest_acceleration(system, b), duration):
+            return LOOK_CLOSER
+        turning = angular_velocity(b)
+        return LOOK_CLOSER if dot(turning, turning) > 0.0 else math.inf
+    if room > free_displacement(velocity, norm(acceleration), duration):
+        return math.inf
+    time = sphere_half_space_impact(room, dot(inward, velocity), dot(inward, acceleration), duration)
+    if time == 0.0 or (not is_sphere(system.shapes, a.shape_row) and (time < math.inf or room < 0.0)):
+        time = LOOK_CLOSER
+    return time
+
+
+@entry_kernel
+def cull_half_spaces(system, standing, duration, first, last):
+    """As ``cull_pairs``, of particles ``first .. last`` with half-spaces, which stand in no list: slot -1."""
+    system, standing = without_refcounts((system, standing))
+    found = np.empty((len(system.body) - system.bounded) * (last - first), dtype=CANDIDATE)
     count = 0
     for i in range(first, last):
         if standing[i] == SETTLES:
             continue
-        x, v, a = load_vec3(position, i), load_vec3(velocity, i), load_vec3(acceleration, i)
-        way = free_way(v, a, duration)
-        for wall in range(6):
-            axis = wall // 2
-            if boundary[axis] == WALL:
-                room = (upper[axis] - x[axis] if wall % 2 else x[axis] - lower[axis]) - radius[i]
-                if room > way:
-                    continue
-                sign = 2.0 * (wall % 2) - 1.0
-                time = sphere_meets_wall(room, sign * v[axis], sign * a[axis], duration)
-                if time == 0.0 or (kind[shape[i]] != SPHERE and (time < math.inf or room < 0.0)):
-                    time = -1.0
-                if time < math.inf:
-                    count = _list(found, slots, times, count, i, wall_as_partner(wall), -1, time)
-    return found[:count], slots[:count], times[:count]
+        for j in range(system.bounded, len(system.body)):
+            time = _half_space_time(system, system.body[i], system.body[j], duration)
+            if time < math.inf:
+                c = found[count]
+                c.i, c.j, c.slot, c.time = i, j, -1, time
+                count += 1
+    return found[:count]

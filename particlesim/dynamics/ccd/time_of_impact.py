@@ -1,42 +1,43 @@
-"""When two bodies first meet along their paths: closed forms for spheres, advancement by proven steps for the rest.
+"""When two bodies first touch along their paths: closed forms for spheres, conservative advancement for the rest.
 
 The search knows two bodies to be apart along the normal of their nearest points. It lets the normal stand, or turn with
-either body or with an edge of each, and knows how fast every corner moves along it. Taking corners to go straight, and
-allowing for the most that rotation can bend their ways, gives a time in which that normal certainly goes on separating
+either body or with an edge of each, and knows how fast every vertex moves along it. Taking vertices to go straight, and
+allowing for the most that rotation can bend their paths, gives a time in which that normal certainly goes on separating
 them; there the next one is taken. No step can pass an impact, however short, and near one the steps converge to it
-quadratically: over short times the corners do go straight, and the normal that turns with the features in contact keeps
-them level. (Conservative advancement, B. Mirtich, Impulse-based Dynamic Simulation of Rigid Body Systems, PhD thesis,
-Berkeley 1996, section 2.3.2, bounds the speed of all corners alike and closes in on an impact by a constant factor.)
-
-A body is (shape, size, radius, principal moments), a path (position, orientation, velocity, angular momentum,
-acceleration) at time 0.
+quadratically: over short times the vertices do go straight, and the normal that turns with the features in contact
+keeps them level. (Conservative advancement, B. Mirtich, Impulse-based Dynamic Simulation of Rigid Body Systems, PhD
+thesis, Berkeley 1996, section 2.3.2, bounds the speed of all points alike and closes in on an impact by a constant
+factor.)
 """
 
 import math
 
-from particlesim.core.constants import IMPACT_TOLERANCE, SPHERE
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import axpy, dot, inverse_rotate, norm, scale, sub
+from particlesim.core.math3d import add, axpy, cross, dot, inverse_rotate, norm, scale, sub, to_vec3
 from particlesim.dynamics.ccd.conservative_advancement import (
-    ANY_WAY,
+    ANY_MOTION,
     STANDING,
-    farthest,
-    longest_proven_step,
-    step_of_turning,
+    WITH_SECOND,
+    conservative_step,
+    core_reach,
+    longest_step,
 )
-from particlesim.geometry.narrow_phase.half_space import wall_normal, wall_separation
-from particlesim.geometry.narrow_phase.pair import nearest_image, pair_separation
-from particlesim.model.free_motion import free_rotation, spin_of
+from particlesim.dynamics.settings import IMPACT_TOLERANCE, KEEP_NORMAL_MOTION, MAX_ADVANCEMENTS
+from particlesim.geometry.narrow_phase.pair import pair_separation
+from particlesim.geometry.support import is_half_space, is_sphere
+from particlesim.model.bodies import angular_velocity_of
+from particlesim.model.domain import nearest_image
+from particlesim.model.free_motion import free_rotation
+from particlesim.model.prescribed_motion import swing_acceleration, swing_shift
 
-# Looks at the separation in one search, which ends where it is then. Few searches take more than ten.
-_MAX_LOOKS = 60
-
-# The way that was best in the last look is tried alone as long as each look leaves at most this fraction of the gap.
-_CLOSING_IN = 0.25
+_STILL = (0.0, 0.0, 0.0)
 
 
-@kernel(inline=True)
-def spheres_meet(offset, velocity, reach, duration):
+# ---- closed forms --------------------------------------------------------------------------------------------------
+
+
+@kernel
+def sphere_sphere_impact(offset, velocity, reach, duration):
     """When two points at ``offset`` moving apart at ``velocity`` come within ``reach``; inf if not in ``duration``.
 
     0 if they are nearer now and approach. The root of |offset + t velocity| = reach without cancellation.
@@ -55,8 +56,8 @@ def spheres_meet(offset, velocity, reach, duration):
     return time if time <= duration else math.inf
 
 
-@kernel(inline=True)
-def sphere_meets_wall(room, speed, acceleration, duration):
+@kernel
+def sphere_half_space_impact(room, speed, acceleration, duration):
     """When a distance that shrinks at ``speed``, itself growing by ``acceleration``, is used up; inf if it is not."""
     time = math.inf
     room = max(room, 0.0)
@@ -70,7 +71,7 @@ def sphere_meets_wall(room, speed, acceleration, duration):
     return time if time <= duration else math.inf
 
 
-@kernel(inline=True)
+@kernel
 def spheres_near(offset, velocity, reach, duration):
     """From when to when two points are within ``reach``, in 0 .. ``duration``; the first is inf if never."""
     speed2 = dot(velocity, velocity)
@@ -90,167 +91,186 @@ def spheres_near(offset, velocity, reach, duration):
     return first, last
 
 
-@kernel
-def _fastest_corner(body, path):
-    """The largest speed of a point of a body by its rotation [m/s]."""
-    return body[2] * _fastest_spin(body, path)
+# ---- bounds of motion ----------------------------------------------------------------------------------------------
 
 
 @kernel
-def _fastest_spin(body, path):
+def core_of(system, b):
+    """First and last vertex and size of a body's core, as the steps of conservative advancement take it."""
+    s = system.shapes.shape[b.shape_row]
+    return s.first_vertex, s.last_vertex, b.scale
+
+
+@kernel
+def _core_radius(system, b):
+    """How far points of a body's core are from its position at most [m]; rotation moves nothing else that counts."""
+    if is_half_space(system.shapes, b.shape_row):
+        return 0.0
+    return max(b.radius - system.shapes.shape[b.shape_row].rounding * b.scale, 0.0)
+
+
+@kernel
+def _largest_angular_speed(b, path):
     """The largest angular speed of a free body [rad/s]: it keeps its angular momentum and its energy."""
-    a, b, c = body[3]
-    least = min(a, b, c)
-    twice = dot(path[3], spin_of(path[1], path[3], body[3]))
+    inertia = b.principal_inertia
+    least = min(inertia[0], inertia[1], inertia[2])
+    twice = dot(path[3], angular_velocity_of(path[1], path[3], to_vec3(inertia)))
     return min(norm(path[3]) / least, math.sqrt(twice / least))
 
 
-@kernel(inline=True)
-def _turning_speed(kind, body, path):
-    """A bound of the speed of any point of a body by its rotation [m/s], sooner had than the speed itself."""
-    moments = body[3]
-    return body[2] * norm(path[3]) / min(moments[0], moments[1], moments[2]) if kind != SPHERE else 0.0
+@kernel
+def _surface_speed(system, b, path):
+    """The largest speed of a point of a body by its rotation [m/s]."""
+    return _core_radius(system, b) * _largest_angular_speed(b, path)
 
 
 @kernel
-def most_closing(body_i, path_i, body_j, path_j, duration):
-    """How far two surfaces can come nearer within ``duration`` at the most [m]."""
-    speed = norm(sub(path_j[2], path_i[2])) + 0.5 * norm(sub(path_j[4], path_i[4])) * duration
-    return (speed + _fastest_corner(body_i, path_i) + _fastest_corner(body_j, path_j)) * duration
+def _surface_speed_bound(system, b, path):
+    """A bound of the speed of any point of a body's core by its rotation [m/s], sooner had than the speed itself."""
+    inertia = b.principal_inertia
+    return _core_radius(system, b) * norm(path[3]) / min(inertia[0], inertia[1], inertia[2])
 
 
-@kernel(inline=True)
-def _place(kind, body, path, time):
-    """Position, orientation and angular velocity at ``time``; those of a sphere's rotation do not matter."""
-    position, turn, velocity, momentum, acceleration = path
-    position = axpy(axpy(position, velocity, time), acceleration, 0.5 * time * time)
-    spin = (0.0, 0.0, 0.0)
-    if kind != SPHERE:
-        turn = free_rotation(turn, momentum, body[3], time)
-        spin = spin_of(turn, momentum, body[3])
-    return position, turn, spin
+@kernel
+def largest_displacement(system, a, b, paths, duration):
+    """How far two surfaces can come nearer within ``duration`` at most [m]."""
+    path_a, path_b = paths
+    speed = norm(sub(path_b[2], path_a[2])) + 0.5 * relative_acceleration(paths) * duration
+    return (speed + _surface_speed(system, a, path_a) + _surface_speed(system, b, path_b)) * duration
 
 
-@kernel(inline=True)
-def _bend(kind, body, path):
-    """The largest acceleration of a point of a body by its rotation [m/s^2].
+@kernel
+def relative_acceleration(paths):
+    """The largest acceleration of the positions of two bodies against each other [m/s^2]."""
+    path_a, path_b = paths
+    return norm(sub(path_b[4], path_a[4])) + swing_acceleration(path_b[5])
+
+
+@kernel
+def _vertex_acceleration(system, b, path):
+    """The largest acceleration of a point of a body's core by its rotation [m/s^2].
 
     It is w x (w x r) + w' x r, and the angular velocity w of a free body changes as w' = -I^-1 (w x L), where
     w x L = w x (I - c) w for any number c.
     """
-    bend = 0.0
-    if kind != SPHERE:
-        a, b, c = body[3]
-        whole = norm(path[3])
-        twice = dot(path[3], spin_of(path[1], path[3], body[3]))
-        x, y, z = (
-            min(whole / a, math.sqrt(twice / a)),
-            min(whole / b, math.sqrt(twice / b)),
-            min(whole / c, math.sqrt(twice / c)),
-        )
-        change = norm((abs(b - c) / a * y * z, abs(c - a) / b * z * x, abs(a - b) / c * x * y))
-        fastest = min(_fastest_spin(body, path), norm((x, y, z)))
-        bend = body[2] * (fastest * fastest + change)
-    return bend
+    radius = _core_radius(system, b)
+    if radius == 0.0:
+        return 0.0
+    p, q, r = to_vec3(b.principal_inertia)
+    whole = norm(path[3])
+    twice = dot(path[3], angular_velocity_of(path[1], path[3], (p, q, r)))
+    x, y, z = (
+        min(whole / p, math.sqrt(twice / p)),
+        min(whole / q, math.sqrt(twice / q)),
+        min(whole / r, math.sqrt(twice / r)),
+    )
+    change = norm((abs(q - r) / p * y * z, abs(r - p) / q * z * x, abs(p - q) / r * x * y))
+    fastest = min(_largest_angular_speed(b, path), norm((x, y, z)))
+    return radius * (fastest * fastest + change)
+
+
+# ---- advancement ---------------------------------------------------------------------------------------------------
 
 
 @kernel
-def stays_apart(table, body_i, path_i, body_j, path_j, offset, normal, duration):
+def _pose_at(system, b, path, time):
+    """Position, orientation and angular velocity at ``time``; those of a sphere's rotation do not matter."""
+    position, orientation, velocity, momentum, acceleration, swing = path
+    position = axpy(axpy(position, velocity, time), acceleration, 0.5 * time * time)
+    if swing[1] != 0.0:
+        position = add(position, swing_shift(swing, time)[0])
+    spin = _STILL
+    if not is_sphere(system.shapes, b.shape_row):
+        inertia = to_vec3(b.principal_inertia)
+        orientation = free_rotation(orientation, momentum, inertia, time)
+        spin = angular_velocity_of(orientation, momentum, inertia)
+    return position, orientation, spin
+
+
+@kernel
+def _velocity_at(paths, time):
+    """Velocity of the second body against the first at ``time``."""
+    path_a, path_b = paths
+    velocity = axpy(sub(path_b[2], path_a[2]), sub(path_b[4], path_a[4]), time)
+    if path_b[5][1] != 0.0:
+        velocity = add(velocity, swing_shift(path_b[5], time)[1])
+    return velocity
+
+
+@kernel
+def stays_apart(system, a, b, paths, offset, normal, duration):
     """Whether a normal that stands is proven to separate two bodies, now at ``offset``, for ``duration`` [s]."""
-    vertex, vertex_start = table.vertex, table.vertex_start
-    kind_i, kind_j = table.kind[body_i[0]], table.kind[body_j[0]]
-    range_i = vertex_start[body_i[0]], vertex_start[body_i[0] + 1]
-    range_j = vertex_start[body_j[0]], vertex_start[body_j[0] + 1]
-    nothing = (0.0, 0.0, 0.0)
-    reach_i, reach_j = body_i[2], body_j[2]
-    if kind_i != SPHERE:
-        way = scale(inverse_rotate(path_i[1], normal), body_i[1])
-        reach_i, _ = farthest(vertex, range_i[0], range_i[1], way, nothing, 0.0)
-    if kind_j != SPHERE:
-        way = scale(inverse_rotate(path_j[1], normal), -body_j[1])
-        reach_j, _ = farthest(vertex, range_j[0], range_j[1], way, nothing, 0.0)
+    vertex = system.shapes.vertex
+    path_a, path_b = paths
+    core_a, core_b = core_of(system, a), core_of(system, b)
+    reach_a = core_reach(vertex, core_a, scale(inverse_rotate(path_a[1], normal), a.scale), _STILL, 0.0)[0]
+    reach_b = core_reach(vertex, core_b, scale(inverse_rotate(path_b[1], normal), -b.scale), _STILL, 0.0)[0]
+    reach_a += system.shapes.shape[a.shape_row].rounding * a.scale
+    reach_b += system.shapes.shape[b.shape_row].rounding * b.scale
     # What nearly touches is left to the search, which knows whether that is an impact.
-    gap = dot(offset, normal) - reach_i - reach_j - 2.0 * IMPACT_TOLERANCE * (body_i[1] + body_j[1])
+    gap = dot(offset, normal) - reach_a - reach_b - 2.0 * IMPACT_TOLERANCE * (a.scale + b.scale)
     if gap <= 0.0:
         return False
-    # Most are so far apart that not even their fastest corners close the gap.
-    turning = _turning_speed(kind_i, body_i, path_i) + _turning_speed(kind_j, body_j, path_j)
-    pull = norm(sub(path_j[4], path_i[4])) * duration
-    if gap >= (max(0.0, dot(sub(path_i[2], path_j[2]), normal)) + 0.5 * pull + turning) * duration:
+    # Most are so far apart that not even their fastest points close the gap.
+    turning = _surface_speed_bound(system, a, path_a) + _surface_speed_bound(system, b, path_b)
+    acceleration = relative_acceleration(paths)
+    if gap >= (max(0.0, dot(sub(path_a[2], path_b[2]), normal)) + 0.5 * (acceleration * duration) + turning) * duration:
         return True
-    bend = norm(sub(path_j[4], path_i[4])) + _bend(kind_i, body_i, path_i) + _bend(kind_j, body_j, path_j)
-    now_i = body_i[1], path_i[1], spin_of(path_i[1], path_i[3], body_i[3])
-    now_j = body_j[1], path_j[1], spin_of(path_j[1], path_j[3], body_j[3])
-    velocity, speed = sub(path_j[2], path_i[2]), (0.0, 0.0)
-    step = step_of_turning(
-        vertex, range_i, now_i, range_j, now_j, normal, nothing, gap, offset, velocity, speed, bend, duration
-    )
-    return step >= duration
+    bound = acceleration + _vertex_acceleration(system, a, path_a) + _vertex_acceleration(system, b, path_b)
+    side_a = core_a, path_a[1], angular_velocity_of(path_a[1], path_a[3], to_vec3(a.principal_inertia))
+    side_b = core_b, path_b[1], angular_velocity_of(path_b[1], path_b[3], to_vec3(b.principal_inertia))
+    known = normal, gap, offset, sub(path_b[2], path_a[2]), (0.0, 0.0), bound
+    return conservative_step(vertex, side_a, side_b, known, _STILL, duration) >= duration
 
 
 @kernel
-def first_touch(table, lower, upper, period, body_i, path_i, body_j, path_j, wall, start, end, sunk, corners, points):
-    """When the separation of two bodies first falls to nothing in ``start .. end`` [s]; inf if it does not.
+def first_touch(system, a, b, paths, interval, depth, simplex, points):
+    """When the separation of two bodies first falls to nothing in an interval [s]; inf if it does not.
 
-    The partner is wall ``wall``, or body j if that is -1. With ``sunk`` [m] it is when the separation falls to minus
-    that. At the moment returned it is larger, by IMPACT_TOLERANCE of their sizes at the most. ``corners`` are those by
-    which hulls are likely to be nearest, or NO_CORNERS.
+    With ``depth`` [m] it is when the separation falls to minus that. At the moment returned it is larger, by
+    IMPACT_TOLERANCE of their sizes at most. ``simplex`` is the one by which they were nearest before, or NO_SIMPLEX.
     """
-    vertex, vertex_start = table.vertex, table.vertex_start
-    kind_i, kind_j = table.kind[body_i[0]], table.kind[body_j[0]]
-    range_i = vertex_start[body_i[0]], vertex_start[body_i[0] + 1]
-    range_j = vertex_start[body_j[0]], vertex_start[body_j[0] + 1]
-    sizes, radii = body_i[1] + body_j[1], body_i[2] + body_j[2]
-    velocity, acceleration = sub(path_j[2], path_i[2]), sub(path_j[4], path_i[4])
-    turning = _fastest_corner(body_i, path_i)
-    if wall >= 0:
-        range_j, sizes, radii = (0, 0), body_i[1], body_i[2]
-        velocity, acceleration = scale(path_i[2], -1.0), scale(path_i[4], -1.0)
-    else:
-        turning += _fastest_corner(body_j, path_j)
-    way = norm(velocity) + norm(acceleration) * end
-    time, last_gap, best, bend = start, math.inf, ANY_WAY, -1.0
-    for _ in range(_MAX_LOOKS):
-        x, q, w = _place(kind_i, body_i, path_i, time)
-        p, u = q, (0.0, 0.0, 0.0)
-        if wall >= 0:
-            gap = wall_separation(table, lower, upper, wall, body_i[0], body_i[1], q, x)
-            normal = wall_normal(wall)
-            offset = (0.0, 0.0, 0.0)
-        else:
-            y, p, u = _place(kind_j, body_j, path_j, time)
-            offset = nearest_image(sub(y, x), period)
-            gap, normal, corners = pair_separation(
-                table, body_i[0], body_i[1], q, body_j[0], body_j[1], p, offset, corners, points
-            )
-        gap += sunk
-        if gap <= IMPACT_TOLERANCE * sizes:
+    vertex, period = system.shapes.vertex, system.domain[0].period
+    path_a, path_b = paths
+    time, end = interval
+    half_space = is_half_space(system.shapes, b.shape_row)
+    sizes = a.scale if half_space else a.scale + b.scale
+    tolerance = IMPACT_TOLERANCE * sizes
+    core_a, core_b = core_of(system, a), core_of(system, b)
+    acceleration = relative_acceleration(paths)
+    turning = _surface_speed(system, a, path_a) + _surface_speed(system, b, path_b)
+    radii = _core_radius(system, a) + _core_radius(system, b)
+    displacement = norm(sub(path_b[2], path_a[2])) + acceleration * end
+    last_gap, best, bound = math.inf, ANY_MOTION, -1.0
+    for _ in range(MAX_ADVANCEMENTS):
+        x, q, w = _pose_at(system, a, path_a, time)
+        y, p, u = _pose_at(system, b, path_b, time)
+        offset = nearest_image(sub(y, x), period)
+        gap, normal, simplex = pair_separation(
+            system.shapes, (a.shape_row, a.scale, q), (b.shape_row, b.scale, p), offset, simplex, points
+        )
+        gap += depth
+        if gap <= tolerance:
             return time
         left = end - time
-        now = axpy(velocity, acceleration, time)
-        # Most are so far apart that not even their fastest corners close the gap.
-        closing = turning + max(0.0, -dot(now, normal)) + norm(acceleration) * left
-        if gap - IMPACT_TOLERANCE * sizes > closing * left:
+        velocity = _velocity_at(paths, time)
+        # Most are so far apart that not even their fastest points close the gap.
+        closing = turning + max(0.0, -dot(velocity, normal)) + acceleration * left
+        if half_space:
+            closing += norm(u) * (norm(offset) + displacement * left + radii)
+        if gap - tolerance > closing * left:
             return math.inf
-        if bend < 0.0:
-            bend = norm(acceleration) + _bend(kind_i, body_i, path_i)
-            bend += _bend(kind_j, body_j, path_j) if wall < 0 else 0.0
-        way_of_normal = best if gap <= _CLOSING_IN * last_gap else ANY_WAY
-        step, best = longest_proven_step(
-            vertex,
-            range_i,
-            (body_i[1], q, w),
-            range_j,
-            (body_j[1], p, u),
-            normal,
-            STANDING if wall >= 0 else way_of_normal,
-            gap,
-            offset,
-            now,
-            (way + turning, norm(offset) + radii + way * left),
-            bend,
-            left,
-        )
+        if bound < 0.0:
+            bound = acceleration + _vertex_acceleration(system, a, path_a)
+            bound += _vertex_acceleration(system, b, path_b)
+        motion = best if gap <= KEEP_NORMAL_MOTION * last_gap else ANY_MOTION
+        if half_space:
+            motion = WITH_SECOND if dot(u, u) > 0.0 else STANDING
+        bounds = displacement + turning, norm(offset) + radii + displacement * left
+        # The normal of a half-space must turn with it, on a cone; any other goes the shortest way.
+        coning = norm(u) * norm(cross(u, normal)) * bounds[1] if half_space else 0.0
+        known = normal, gap, offset, velocity, bounds, bound + coning
+        step, best = longest_step(vertex, (core_a, q, w), (core_b, p, u), known, motion, left)
         if step >= left:
             return math.inf
         time, last_gap = time + step, gap

@@ -1,88 +1,132 @@
-"""The impulses that answer impacts at one moment.
+"""Impacts: the impulses that resolve the contacts of one moment.
 
 Every impulse acts equally and oppositely at one point, so momentum and angular momentum are kept whatever its size;
-its size keeps the kinetic energy when the restitution is 1. Contacts of one moment that share particles are answered
-together: each gets the impulse that would stop its own approach, and all are stretched by one factor, so that the
-energy is what the restitution says. What is symmetric stays symmetric, and where only one contact approaches (a row
-of balls) it is answered by itself, one after the other.
+its size keeps the kinetic energy when the restitution is 1. Contacts of one moment that share particles are resolved
+together: each gets the impulse that would stop its own approach, and all are scaled by one factor, so that the energy
+is what the restitution says. What is symmetric stays symmetric, and where only one contact approaches (a row of balls)
+it is resolved by itself, one after the other.
 """
 
-import math
+from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.core.constants import (
-    APPROACH_TOLERANCE,
-    MAX_MANIFOLD,
-    MAX_PATCH_IMPULSES,
-    RESTITUTION_THRESHOLD_HEIGHT,
-    WALL,
-)
+from particlesim.core.constants import MAX_MANIFOLD
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import add, axpy, cross, dot, load_quat, load_vec3, norm, scale, store_vec3, sub, to_vec3
-from particlesim.geometry.narrow_phase.half_space import wall_normal
-from particlesim.model.free_motion import particle_spin, spin_of
-from particlesim.model.touching import contact_now, wall_of_partner
+from particlesim.core.math3d import add, axpy, cross, dot, load_vec3, norm, scale, set_vec3, sub, to_vec3
+from particlesim.core.records import record
+from particlesim.dynamics.contact.law import rest_threshold, restitution_of, tangent_of
+from particlesim.dynamics.settings import APPROACH_TOLERANCE, MAX_MANIFOLD_IMPULSES
+from particlesim.geometry.narrow_phase.pair import pair_contact
+from particlesim.model.bodies import (
+    BODY,
+    DYNAMIC,
+    angular_velocity,
+    angular_velocity_change,
+    per_mass,
+    placed,
+)
+from particlesim.model.domain import nearest_image
 
-# What came of contacts: they did not approach, met fast, met slowly and rebounded in full until they come to rest, or
-# met slowly and are both held, which is left to the next stretch.
+# What became of contacts: they did not approach; they approached fast; slowly, and rebounded in full until they come to
+# rest; or slowly with both bodies resting, which is left to the next substep.
 NOTHING, STRUCK, REBOUNDED, LEFT = 0, 1, 2, 3
 
-# Columns of an island's tally: impacts, the virial, then the impulse on each of six walls.
+# Columns of an island's accumulator: impacts, the virial, then the impulse on each wall.
 IMPACTS, VIRIAL, WALLS = 0, 1, 2
-TALLY = 8
+ACCUMULATED = 8
+
+# Contacts and bodies of one moment; more that are simultaneous are resolved one after the other.
+MAX_CONTACTS = 64
+
+CONTACT = record(
+    [
+        ("normal", "f8", (3,)),  # from a to b
+        ("tangent", "f8", (3,)),  # with normal x tangent the basis in which friction acts
+        ("offset", "f8", (3,)),  # b's position from a's [m]
+        ("count", "i8"),  # of the points
+        ("impulse", "f8"),  # of the present round [N s]
+        ("resolved", "i8"),  # whether it has had any
+        ("a", "i8"),  # actors
+        ("b", "i8"),
+    ]
+)
 
 
-# ---- one impulse -------------------------------------------------------------------------------------------------
+class Moment(NamedTuple):
+    """Room for what happens at one moment: bodies are copies of their records, advanced to it."""
+
+    pair: np.ndarray  # (c, 2) int64, the bodies of each contact
+    contact: np.ndarray  # (c,) CONTACT
+    points: np.ndarray  # (c, MAX_MANIFOLD, 3) of each contact, from a's position [m]
+    indices: np.ndarray  # (m,) int64, the bodies that take part
+    actor: np.ndarray  # (m,) BODY, their records
+    struck: np.ndarray  # (m,) int64, how many impacts each has had
+    push: np.ndarray  # (m, 6) impulse [N s] and angular impulse [N m s] of the present round
 
 
 @kernel
-def _point_velocity(constants, state, i, arm):
-    """Velocity of the point of particle ``i`` at ``arm`` from its centroid."""
-    return add(load_vec3(state.velocity, i), cross(particle_spin(constants, state, i), arm))
+def new_moment():
+    """Room for MAX_CONTACTS contacts."""
+    bodies = 2 * MAX_CONTACTS
+    return Moment(
+        np.empty((MAX_CONTACTS, 2), dtype=np.int64),
+        np.empty(MAX_CONTACTS, dtype=CONTACT),
+        np.empty((MAX_CONTACTS, MAX_MANIFOLD, 3)),
+        np.empty(bodies, dtype=np.int64),
+        np.empty(bodies, dtype=BODY),
+        np.empty(bodies, dtype=np.int64),
+        np.empty((bodies, 6)),
+    )
+
+
+# ---- one impulse ---------------------------------------------------------------------------------------------------
 
 
 @kernel
-def _inverse_mass_at(constants, state, i, arm, normal):
-    """How much speed along ``normal`` a unit impulse along it gives the point at ``arm`` [1/kg].
+def _point_velocity(b, lever_arm):
+    """Velocity of the point of a body at ``lever_arm`` from its position."""
+    return add(to_vec3(b.velocity), cross(angular_velocity(b), lever_arm))
+
+
+@kernel
+def _inverse_mass_at(b, lever_arm, normal):
+    """How much speed along ``normal`` a unit impulse along it gives the point at ``lever_arm`` [1/kg].
 
     1/m + n . ((I^-1 (r x n)) x r) (D. Baraff, SIGGRAPH 1997 course notes, Rigid Body Simulation II, eq. 8-18)
     """
-    twist = cross(arm, normal)
-    spin = spin_of(load_quat(state.orientation, i), twist, load_vec3(constants.inertia, i))
-    return dot(normal, normal) / constants.mass[i] + dot(twist, spin)
+    lever = cross(lever_arm, normal)
+    return per_mass(b, dot(normal, normal)) + dot(lever, angular_velocity_change(b, lever))
 
 
 @kernel
-def approach(still, constants, state, i, j, point, offset, normal):
-    """Speed at which the partners part at a point (negative: they approach), and the speed that counts as none."""
-    of_i = _point_velocity(constants, state, i, point)
-    parting = -dot(of_i, normal)
-    speed = norm(of_i)
-    if j >= 0:
-        of_j = _point_velocity(constants, state, j, sub(point, offset))
-        parting += dot(of_j, normal)
-        speed += norm(of_j)
-    return parting, APPROACH_TOLERANCE * speed + still
+def normal_velocity_at(a, b, lever_arm, offset, normal):
+    """Normal velocity of two bodies at a point (negative: they approach), and the sum of the speeds there [m/s]."""
+    of_a, of_b = _point_velocity(a, lever_arm), _point_velocity(b, sub(lever_arm, offset))
+    return -dot(of_a, normal) + dot(of_b, normal), norm(of_a) + norm(of_b)
 
 
 @kernel
-def _resting_speed(world, constants, i):
-    """Speed below which an impact under gravity keeps its energy (see RESTITUTION_THRESHOLD_HEIGHT) [m/s]."""
-    g = norm(to_vec3(world.gravity))
-    return math.sqrt(2.0 * g * RESTITUTION_THRESHOLD_HEIGHT * constants.inradius[i])
-
-
-@kernel
-def restitution_of(world, constants, i, j):
-    """Of a pair: the smaller one; and the speed below which it does not count."""
-    if j < 0:
-        return min(constants.restitution[i], world.restitution), _resting_speed(world, constants, i)
-    resting = min(_resting_speed(world, constants, i), _resting_speed(world, constants, j))
-    return min(constants.restitution[i], constants.restitution[j]), resting
+def is_resting(b):
+    """Whether resting contacts carry a body through the present substep; what cannot be pushed always rests."""
+    return b.kind != DYNAMIC or b.resting != 0
 
 
 # ---- contacts of one moment ----------------------------------------------------------------------------------------
+
+
+@kernel
+def find_contact(system, a, b, contact, points):
+    """Fill in the contact of two bodies where they are now, and its points; returns their separation."""
+    offset = nearest_image(sub(to_vec3(b.position), to_vec3(a.position)), system.domain[0].period)
+    separation, normal, count = pair_contact(system.shapes, placed(a), placed(b), offset, points)
+    set_vec3(contact.normal, normal)
+    set_vec3(contact.tangent, tangent_of(normal))
+    set_vec3(contact.offset, offset)
+    contact.count = count
+    return separation
 
 
 @kernel
@@ -94,25 +138,53 @@ def _middle(points, count):
 
 
 @kernel
-def _point_to_answer(still, constants, state, i, j, points, count, offset, normal):
-    """Where a contact is answered next, and how fast it parts there; 0 if it approaches nowhere.
+def _point_to_resolve(rest_speed, a, b, contact, points):
+    """Where a contact is resolved next, and its normal velocity there; 0 if it approaches nowhere.
 
-    First in the middle of its patch, then where it approaches fastest: a face that lands flat is thus pushed in its
+    First in the middle of its manifold, then where it approaches fastest: a face that lands flat is thus pushed in its
     middle and does not start to spin.
     """
-    point = _middle(points, count)
-    parting, tolerance = approach(still, constants, state, i, j, point, offset, normal)
-    if parting >= -tolerance:
-        parting = 0.0
-        for k in range(count):
-            at_corner, small = approach(still, constants, state, i, j, load_vec3(points, k), offset, normal)
-            if at_corner < parting and at_corner < -small:
-                parting, point = at_corner, load_vec3(points, k)
-    return point, parting
+    normal, offset = to_vec3(contact.normal), to_vec3(contact.offset)
+    point = _middle(points, contact.count)
+    speed, scale_of_speed = normal_velocity_at(a, b, point, offset, normal)
+    if speed >= -(APPROACH_TOLERANCE * scale_of_speed + rest_speed):
+        speed = 0.0
+        for k in range(contact.count):
+            corner = load_vec3(points, k)
+            at_corner, scale_of_speed = normal_velocity_at(a, b, corner, offset, normal)
+            if at_corner < speed and at_corner < -(APPROACH_TOLERANCE * scale_of_speed + rest_speed):
+                speed, point = at_corner, corner
+    return point, speed
 
 
 @kernel
-def _stretch(constants, state, whom, size, push, twist, gain):
+def _turns_slowly(b, speed):
+    """Whether rotation moves no point of a body faster than ``speed`` [m/s]; what cannot be pushed does not count."""
+    return b.kind != DYNAMIC or norm(angular_velocity(b)) * b.radius <= speed
+
+
+@kernel
+def _rebound(system, a, b, speed):
+    """What comes of bodies that approach at a ``speed`` [m/s], and the factor on the impulse that would stop them."""
+    restitution, threshold = restitution_of(system, a, b), rest_threshold(system, a, b)
+    if restitution == 1.0 or speed > threshold:
+        return STRUCK, 1.0 + restitution
+    if is_resting(a) and is_resting(b) and _turns_slowly(a, threshold) and _turns_slowly(b, threshold):
+        return LEFT, 0.0
+    return REBOUNDED, 2.0
+
+
+@kernel
+def _add_push(push, impulse, lever_arm, normal):
+    """Add an impulse along ``normal`` at ``lever_arm`` to what a body gets in the present round."""
+    angular = cross(lever_arm, normal)
+    for axis in range(3):
+        push[axis] += impulse * normal[axis]
+        push[3 + axis] += impulse * angular[axis]
+
+
+@kernel
+def _common_factor(moment, size, gain):
     """The factor on all impulses that leaves the energy which the restitutions say.
 
     Along the impulses the kinetic energy is a parabola. Its lowest point is a fully inelastic impact, the mirror image
@@ -121,143 +193,99 @@ def _stretch(constants, state, whom, size, push, twist, gain):
     """
     growth = 0.0
     for k in range(size):
-        i = whom[k]
-        change = load_vec3(push, k)
-        momentum = load_vec3(twist, k)
-        spin = spin_of(load_quat(state.orientation, i), momentum, load_vec3(constants.inertia, i))
-        growth += dot(change, change) / constants.mass[i] + dot(momentum, spin)
+        b, p = moment.actor[k], moment.push[k]
+        impulse, angular = (p[0], p[1], p[2]), (p[3], p[4], p[5])
+        growth += per_mass(b, dot(impulse, impulse)) + dot(angular, angular_velocity_change(b, angular))
     return gain / growth
 
 
 @kernel
-def _slot(whom, size, i):
-    """Where particle ``i`` stands among those of the moment."""
+def _propose(system, moment, c, leave_slow):
+    """The impulse that contact ``c`` is to get in the present round; what becomes of it, and the energy it takes."""
+    contact = moment.contact[c]
+    a, b = moment.actor[contact.a], moment.actor[contact.b]
+    normal, offset = to_vec3(contact.normal), to_vec3(contact.offset)
+    contact.impulse = 0.0
+    point, speed = _point_to_resolve(system.domain[0].rest_speed, a, b, contact, moment.points[c])
+    if speed >= 0.0:
+        return NOTHING, 0.0
+    stop = -speed / (_inverse_mass_at(a, point, normal) + _inverse_mass_at(b, sub(point, offset), normal))
+    what, factor = _rebound(system, a, b, -speed)
+    if what == LEFT or (leave_slow and what != STRUCK):
+        return NOTHING, 0.0
+    contact.impulse = factor * stop
+    _add_push(moment.push[contact.a], -contact.impulse, point, normal)
+    _add_push(moment.push[contact.b], contact.impulse, sub(point, offset), normal)
+    return what, factor * factor * stop * -speed
+
+
+@kernel
+def _apply(moment, size, factor):
+    """Give all bodies their impulses of the present round."""
     for k in range(size):
-        if whom[k] == i:
-            return k
-    return -1
+        b, p = moment.actor[k], moment.push[k]
+        if b.kind == DYNAMIC:
+            set_vec3(b.velocity, axpy(to_vec3(b.velocity), (p[0], p[1], p[2]), per_mass(b, factor)))
+            set_vec3(b.angular_momentum, axpy(to_vec3(b.angular_momentum), (p[3], p[4], p[5]), factor))
 
 
 @kernel
-def _tell(tally, j, impulse, offset, normal):
-    """Book an impulse between a particle and partner j."""
-    if j >= 0:
-        tally[VIRIAL] += impulse * dot(offset, normal)
-    else:
-        tally[WALLS + wall_of_partner(j)] += impulse
+def book_impulse(accumulator, b, impulse, offset, normal):
+    """Book an impulse that body ``b`` got from a particle: on the virial, or on the wall that it is."""
+    if b.kind == DYNAMIC:
+        accumulator[VIRIAL] += impulse * dot(offset, normal)
+    elif b.wall >= 0:
+        accumulator[WALLS + b.wall] += impulse
 
 
 @kernel
-def is_held(acceleration, i):
-    """Whether particle ``i`` is held for the present stretch of time (see resting.py); walls are."""
-    return i < 0 or (acceleration[i, 0] == 0.0 and acceleration[i, 1] == 0.0 and acceleration[i, 2] == 0.0)
+def _book_round(moment, count, factor, accumulator):
+    """Book the impulses of a round."""
+    for c in range(count):
+        contact = moment.contact[c]
+        if contact.impulse > 0.0:
+            contact.resolved = 1
+            offset, normal = to_vec3(contact.offset), to_vec3(contact.normal)
+            book_impulse(accumulator, moment.actor[contact.b], factor * contact.impulse, offset, normal)
 
 
 @kernel
-def let_go(world, constants, acceleration, i, left, tally):
-    """Let gravity act again on particle ``i``, which was struck with ``left`` [s] of the stretch to go.
-
-    If it was held, it has had its share of gravity for the whole stretch. What it weighs is no longer borne by the
-    walls that gravity presses against.
-    """
-    gravity = to_vec3(world.gravity)
-    if is_held(acceleration, i):
-        for wall in range(6):
-            pull = dot(wall_normal(wall), gravity)
-            if world.boundary[wall // 2] == WALL and pull > 0.0:
-                tally[WALLS + wall] -= constants.mass[i] * pull * left
-    store_vec3(acceleration, i, gravity)
+def _count_impacts(moment, count, accumulator):
+    for c in range(count):
+        contact = moment.contact[c]
+        if contact.resolved:
+            accumulator[IMPACTS] += 1
+            moment.struck[contact.a] += 1
+            moment.struck[contact.b] += 1
 
 
 @kernel
-def _turns_slowly(constants, state, i, speed):
-    """Whether rotation moves no point of particle ``i`` faster than ``speed`` [m/s]; walls do not turn."""
-    return i < 0 or norm(particle_spin(constants, state, i)) * constants.radius[i] <= speed
+def resolve_contacts(system, moment, count, size, leave_slow, accumulator):
+    """Resolve ``count`` contacts between ``size`` bodies of one moment until nothing in them approaches.
 
-
-@kernel
-def _bounce(world, constants, state, acceleration, i, j, speed):
-    """What comes of partners that approach at a ``speed`` [m/s], and the factor on the impulse that would stop them."""
-    restitution, resting = restitution_of(world, constants, i, j)
-    if restitution == 1.0 or speed > resting:
-        return STRUCK, 1.0 + restitution
-    held = is_held(acceleration, i) and is_held(acceleration, j)
-    if held and _turns_slowly(constants, state, i, resting) and _turns_slowly(constants, state, j, resting):
-        return LEFT, 0.0
-    return REBOUNDED, 2.0
-
-
-@kernel
-def answer(table, world, constants, state, acceleration, contacts, count, whom, size, leave_slow, struck, tally):
-    """Answer ``count`` contacts (particle, partner) of one moment until nothing in them approaches.
-
-    ``whom`` lists the ``size`` particles in them; with ``leave_slow`` those that may come to rest are left to
-    the next stretch of time. Adds to ``tally``, and 1 for each contact to both its particles' rows of ``struck`` (n,),
-    and returns what came of it: NOTHING if nothing approached, else
+    With ``leave_slow`` those that may come to rest are left to the next substep. Changes the actors' velocities and
+    counts their impacts, adds to ``accumulator``, and returns what came of it: NOTHING if nothing approached, else
     STRUCK if that happened anywhere, or REBOUNDED.
     """
-    points = np.empty((count, MAX_MANIFOLD, 3))
-    corners = np.empty(count, dtype=np.int64)
-    normals, offsets = np.empty((count, 3)), np.empty((count, 3))
-    impulse = np.empty(count)
-    answered = np.empty(count, dtype=np.bool_)
-    push, twist = np.empty((size, 3)), np.empty((size, 3))
+    for k in range(size):
+        moment.struck[k] = 0
     for c in range(count):
-        i, j = contacts[c, 0], contacts[c, 1]
-        _, normal, offset, corners[c] = contact_now(table, world, constants, state, i, j, points[c])
-        store_vec3(normals, c, normal)
-        store_vec3(offsets, c, offset)
-        answered[c] = False
+        contact = moment.contact[c]
+        find_contact(system, moment.actor[contact.a], moment.actor[contact.b], contact, moment.points[c])
+        contact.resolved = 0
     outcome = NOTHING
-    for _ in range(MAX_PATCH_IMPULSES):
-        for k in range(size):
-            store_vec3(push, k, (0.0, 0.0, 0.0))
-            store_vec3(twist, k, (0.0, 0.0, 0.0))
+    for _ in range(MAX_MANIFOLD_IMPULSES):
+        moment.push[:size] = 0.0
         gain = 0.0
         for c in range(count):
-            i, j = contacts[c, 0], contacts[c, 1]
-            normal, offset = load_vec3(normals, c), load_vec3(offsets, c)
-            point, parting = _point_to_answer(
-                world.still, constants, state, i, j, points[c], corners[c], offset, normal
-            )
-            impulse[c] = 0.0
-            if parting < 0.0:
-                inverse_mass = _inverse_mass_at(constants, state, i, point, normal)
-                if j >= 0:
-                    inverse_mass += _inverse_mass_at(constants, state, j, sub(point, offset), normal)
-                stop = -parting / inverse_mass
-                what, bounce = _bounce(world, constants, state, acceleration, i, j, -parting)
-                if what == LEFT or (leave_slow and what != STRUCK):
-                    continue
+            what, energy = _propose(system, moment, c, leave_slow)
+            gain += energy
+            if what != NOTHING:
                 outcome = what if outcome == NOTHING else min(outcome, what)
-                impulse[c] = bounce * stop
-                gain += bounce * bounce * stop * -parting
-                slot = _slot(whom, size, i)
-                store_vec3(push, slot, axpy(load_vec3(push, slot), normal, -impulse[c]))
-                store_vec3(twist, slot, axpy(load_vec3(twist, slot), cross(point, normal), -impulse[c]))
-                if j >= 0:
-                    slot = _slot(whom, size, j)
-                    store_vec3(push, slot, axpy(load_vec3(push, slot), normal, impulse[c]))
-                    store_vec3(twist, slot, axpy(load_vec3(twist, slot), cross(sub(point, offset), normal), impulse[c]))
         if gain == 0.0:
             break
-        factor = 1.0 if count == 1 else _stretch(constants, state, whom, size, push, twist, gain)
-        for k in range(size):
-            i = whom[k]
-            store_vec3(
-                state.velocity, i, axpy(load_vec3(state.velocity, i), load_vec3(push, k), factor / constants.mass[i])
-            )
-            store_vec3(
-                state.angular_momentum, i, axpy(load_vec3(state.angular_momentum, i), load_vec3(twist, k), factor)
-            )
-        for c in range(count):
-            if impulse[c] > 0.0:
-                answered[c] = True
-                _tell(tally, contacts[c, 1], factor * impulse[c], load_vec3(offsets, c), load_vec3(normals, c))
-    for c in range(count):
-        if answered[c]:
-            tally[IMPACTS] += 1
-            for i in contacts[c]:
-                if i >= 0:
-                    struck[i] += 1
+        factor = 1.0 if count == 1 else _common_factor(moment, size, gain)
+        _apply(moment, size, factor)
+        _book_round(moment, count, factor, accumulator)
+    _count_impacts(moment, count, accumulator)
     return outcome

@@ -1,283 +1,284 @@
-"""Who meets whom on the paths that all are on: the first meeting of each pair, and of each particle with each wall."""
+"""Collision prediction: the first impact of each pair on the paths that all bodies are on, and across islands."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.core.constants import MAX_MANIFOLD, SPHERE, WALL
-from particlesim.core.jit import kernel, without_refcounts
-from particlesim.core.math3d import axpy, load_vec3, norm, scale, store_vec3, sub
+from particlesim.core.constants import MAX_MANIFOLD
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
+from particlesim.core.math3d import axpy, norm, scale, sub, to_vec3
 from particlesim.core.parallel import ThreadTeam
-from particlesim.dynamics.ccd.pair_impact import body_of, later, pair_meets, wall_meets
-from particlesim.dynamics.ccd.swept_bounds import balls, free_way, sieve, sieve_walls
+from particlesim.dynamics.ccd.pair_impact import next_impact
+from particlesim.dynamics.ccd.swept_bounds import (
+    CANDIDATE,
+    LOOK_CLOSER,
+    bounds_apart,
+    cull_half_spaces,
+    cull_pairs,
+    free_displacement,
+    inverse_period,
+    write_bounds,
+)
 from particlesim.dynamics.ccd.time_of_impact import stays_apart
-from particlesim.dynamics.events.paths import Course, Log, path_of_piece, path_of_state
-from particlesim.dynamics.neighbour_list import Neighbours, around_of, far_apart
-from particlesim.geometry.narrow_phase.gjk import NO_CORNERS
-from particlesim.geometry.narrow_phase.pair import nearest_image, pair_separation
-from particlesim.geometry.shape_table import ShapeTable
-from particlesim.model.bodies import Constants, State, World
-from particlesim.model.touching import wall_of_partner
+from particlesim.dynamics.events.paths import Paths, path_of_segment
+from particlesim.dynamics.neighbour_list import NeighbourList
+from particlesim.dynamics.settings import PAIR_COST
+from particlesim.geometry.narrow_phase.gjk import NO_SIMPLEX
+from particlesim.geometry.narrow_phase.pair import pair_separation
+from particlesim.geometry.support import is_sphere
+from particlesim.model.domain import nearest_image
+from particlesim.model.free_motion import advance_path, free_acceleration, path_of_body
+from particlesim.model.system import System
 
-# To look into a pair takes as long as other work on so many particles.
-_LOOK = 16
 
-Where = tuple[ShapeTable, World, Constants, State, Course, Log]
+class Predicted(NamedTuple):
+    """The impacts on the paths that all bodies are on at the start of a substep, sorted by pair."""
+
+    first: np.ndarray  # (n,) int64, the first row of a particle, -1 if it has none
+    pair: np.ndarray  # (m, 2) int64, i < j
+    time: np.ndarray  # (m,) [s]
 
 
 @kernel
-def _piece_ends(log, piece, duration):
-    """When a piece of path ends; ``piece`` -1 is the only one of a particle that has met nothing."""
-    following = log.following[piece] if piece >= 0 else -1
-    return log.piece[following, 0] if following >= 0 else duration
+def _segment_end(paths, segment, duration):
+    """When a path segment ends; segment -1 is the only one of a body that is undisturbed."""
+    following = paths.segment[segment].next if segment >= 0 else -1
+    return paths.segment[following].start if following >= 0 else duration
 
 
-@kernel(inline=True)
-def _path_at(log, state, course, constants, i, piece, time):
-    """The path of particle ``i`` as seen at a time within a piece of it."""
-    if piece >= 0:
-        path = path_of_piece(log.piece, piece)
-        begun = log.piece[piece, 0]
+@kernel
+def _path_at(system, paths, i, segment, time):
+    """The path of body ``i`` as seen at a time within a segment of it."""
+    if segment >= 0:
+        path, begun = path_of_segment(system, paths.segment[segment]), paths.segment[segment].start
     else:
-        path = path_of_state(state, course.acceleration, i)
-        begun = 0.0
-    return later(path, load_vec3(constants.inertia, i), time - begun)
+        path, begun = path_of_body(system, i), 0.0
+    return advance_path(path, to_vec3(system.body[i].principal_inertia), time - begun)
 
 
-@kernel(inline=True)
-def _first_meeting(table, world, constants, state, course, log, i, j, duration, corners, points):
-    """When particles i and j first meet, whatever else they meet meanwhile; inf if they do not."""
-    piece_i, piece_j = course.head[i], course.head[j]
-    body_i, body_j = body_of(constants, i), body_of(constants, j)
-    kind_i, kind_j = table.kind[body_i[0]], table.kind[body_j[0]]
+@kernel
+def _first_impact(system, paths, i, j, duration, simplex, points):
+    """When bodies i < j first collide, whatever else strikes them meanwhile; inf if they do not."""
+    segment_i, segment_j = paths.clock[i].first_segment, paths.clock[j].first_segment
     time, found = 0.0, math.inf
     while time < duration and found == math.inf:
-        end_i, end_j = _piece_ends(log, piece_i, duration), _piece_ends(log, piece_j, duration)
+        end_i, end_j = _segment_end(paths, segment_i, duration), _segment_end(paths, segment_j, duration)
         end = min(end_i, end_j)
-        path_i = _path_at(log, state, course, constants, i, piece_i, time)
-        path_j = _path_at(log, state, course, constants, j, piece_j, time)
-        found = time + pair_meets(
-            table, world, kind_i, body_i, path_i, kind_j, body_j, path_j, end - time, corners, points
-        )
+        both = _path_at(system, paths, i, segment_i, time), _path_at(system, paths, j, segment_j, time)
+        found = time + next_impact(system, system.body[i], system.body[j], both, end - time, simplex, points)
         time = end
-        if end_i <= end and piece_i >= 0:
-            piece_i = log.following[piece_i]
-        if end_j <= end and piece_j >= 0:
-            piece_j = log.following[piece_j]
+        if end_i <= end and segment_i >= 0:
+            segment_i = paths.segment[segment_i].next
+        if end_j <= end and segment_j >= 0:
+            segment_j = paths.segment[segment_j].next
     return found
 
 
-@kernel(inline=True)
-def _wall_met(table, world, constants, state, course, i, wall, duration, points):
-    """When particle ``i`` first meets a wall on the path it is on at the start; inf if it does not."""
-    path = path_of_state(state, course.acceleration, i)
-    body = body_of(constants, i)
-    return wall_meets(
-        table, world, world.lower, world.upper, world.boundary, table.kind[body[0]], body, path, wall, duration, points
-    )
+@kernel
+def _stay_apart(system, i, j, normal, duration, points):
+    """Whether a normal is soon found that separates bodies i and j as long as nothing strikes them.
 
-
-@kernel(inline=True)
-def _stay_apart(table, world, constants, state, course, i, j, normals, slot, duration, points):
-    """Whether a normal is soon found that separates particles i and j as long as they go straight on.
-
-    First the one in row ``slot`` of ``normals``, which did so a stretch of time ago, or the line of centres. If it
-    does not, the normal of the nearest points is tried, and kept. Nothing but time depends on it. Returns the corners
-    that hulls are nearest by as well, NO_CORNERS where that was not looked into.
+    First the ``normal`` that did so a substep ago, or the line of centres. If it does not, the normal of the nearest
+    points is tried, and kept. Nothing but the computing time depends on it. Returns the simplex by which they are
+    nearest as well, NO_SIMPLEX where that was not looked into.
     """
-    corners = NO_CORNERS
-    body_i, body_j = body_of(constants, i), body_of(constants, j)
-    path_i, path_j = path_of_state(state, course.acceleration, i), path_of_state(state, course.acceleration, j)
-    offset = nearest_image(sub(path_j[0], path_i[0]), world.period)
-    known = float(normals[slot, 0]), float(normals[slot, 1]), float(normals[slot, 2])
+    simplex = NO_SIMPLEX
+    a, b = system.body[i], system.body[j]
+    paths = path_of_body(system, i), path_of_body(system, j)
+    offset = nearest_image(sub(paths[1][0], paths[0][0]), system.domain[0].period)
+    known = float(normal[0]), float(normal[1]), float(normal[2])
     if known[0] == 0.0 and known[1] == 0.0 and known[2] == 0.0:
         known = offset
     length = norm(known)
     apart = length > 0.0
     if apart:
-        known = scale(known, 1.0 / length)
-        apart = stays_apart(table, body_i, path_i, body_j, path_j, offset, known, duration)
+        apart = stays_apart(system, a, b, paths, offset, scale(known, 1.0 / length), duration)
     if not apart:
-        gap, normal, corners = pair_separation(
-            table, body_i[0], body_i[1], path_i[1], body_j[0], body_j[1], path_j[1], offset, NO_CORNERS, points
-        )
+        placed_a, placed_b = (a.shape_row, a.scale, paths[0][1]), (b.shape_row, b.scale, paths[1][1])
+        gap, found, simplex = pair_separation(system.shapes, placed_a, placed_b, offset, NO_SIMPLEX, points)
         if gap > 0.0:
-            store_vec3(normals, slot, normal)
-            apart = stays_apart(table, body_i, path_i, body_j, path_j, offset, normal, duration)
-    return apart, corners
+            normal[0], normal[1], normal[2] = found
+            apart = stays_apart(system, a, b, paths, offset, found, duration)
+    return apart, simplex
 
 
 @kernel
-def _look_closer(
-    table, world, constants, state, course, log, pairs, normals, slots, times, duration, points, first, last
-):  # fmt: skip
-    """Fill in the times of pairs ``first .. last`` where they are -1.
+def _are_spheres(system, i, j):
+    shapes, body = system.shapes, system.body
+    return is_sphere(shapes, body[i].shape_row) and is_sphere(shapes, body[j].shape_row)
 
-    Pairs whose ``slots`` are not -1 go straight on, and have a row in ``normals`` (see neighbours.py).
+
+@entry_kernel
+def _look_closer(system, paths, normals, candidates, duration, first, last):
+    """Fill in the times of candidates ``first .. last`` where they are LOOK_CLOSER.
+
+    Those whose slots are not -1 are on free paths, and have a row in ``normals`` (see neighbour_list.py).
     """
-    table, world, constants, state, course, log = without_refcounts((table, world, constants, state, course, log))
-    pairs, normals, slots, times, points = without_refcounts((pairs, normals, slots, times, points))
-    kind, shape = table.kind, constants.shape
+    system, paths, normals, candidates = without_refcounts((system, paths, normals, candidates))
+    points = np.empty((MAX_MANIFOLD, 3))
     for k in range(first, last):
-        if times[k] < 0.0:
-            i, j = pairs[k, 0], pairs[k, 1]
-            if j < 0:
-                times[k] = _wall_met(table, world, constants, state, course, i, wall_of_partner(j), duration, points)
-                continue
-            times[k] = math.inf
-            spheres = kind[shape[i]] == SPHERE and kind[shape[j]] == SPHERE
-            apart, corners = False, NO_CORNERS
-            if not spheres and slots[k] >= 0:
-                apart, corners = _stay_apart(
-                    table, world, constants, state, course, i, j, normals, slots[k], duration, points
-                )
+        c = candidates[k]
+        if c.time == LOOK_CLOSER:
+            c.time = math.inf
+            i, j = c.i, c.j
+            apart, simplex = False, NO_SIMPLEX
+            if c.slot >= 0 and not (
+                is_sphere(system.shapes, system.body[i].shape_row)
+                and is_sphere(system.shapes, system.body[j].shape_row)
+            ):
+                apart, simplex = _stay_apart(system, i, j, normals[c.slot], duration, points)
             if not apart:
-                times[k] = _first_meeting(table, world, constants, state, course, log, i, j, duration, corners, points)
+                c.time = _first_impact(system, paths, i, j, duration, simplex, points)
 
 
-@kernel
-def _across(island, head, first_piece, ball, period, lists, whom, first, last):
-    """Pairs (m, 2), the smaller first, of particles ``whom[first:last]`` with others of other islands they may meet.
+@entry_kernel
+def _across(system, paths, first_segment, bound, neighbours, indices, first, last):
+    """Candidates (m,) of particles ``indices[first:last]`` with bodies of other islands that they may touch.
 
-    ``whom`` are all those whose pieces of path begin with ``first_piece`` or later; pairs among them stand there once.
+    ``indices`` are all those whose path segments begin with ``first_segment`` or later; pairs of them stand there once.
     """
-    island, head, ball, lists, whom = without_refcounts((island, head, ball, lists, whom))
-    particle, place, start, other = lists
-    around = around_of(period)
+    system, paths, first_segment, bound, neighbours, indices = without_refcounts(
+        (system, paths, first_segment, bound, neighbours, indices)
+    )
+    clock = paths.clock
+    periods = inverse_period(system.domain[0].period)
     most = 0
     for k in range(first, last):
-        p = place[whom[k]]
-        most += start[p + 1] - start[p]
-    pairs = np.empty((most, 2), dtype=np.int64)
+        p = neighbours.place[indices[k]]
+        most += neighbours.start[p + 1] - neighbours.start[p]
+    found = np.empty(most, dtype=CANDIDATE)
     count = 0
     for k in range(first, last):
-        i = whom[k]
-        p = place[i]
-        for near in range(start[p], start[p + 1]):
-            if far_apart(ball, p, other[near], around):
+        i = indices[k]
+        p = neighbours.place[i]
+        for near in range(neighbours.start[p], neighbours.start[p + 1]):
+            q = neighbours.other[near]
+            j = neighbours.body[q]
+            if j >= system.particles or bounds_apart(bound[p], bound[q], periods):
                 continue
-            j = particle[other[near]]
-            if island[j] != island[i] and (j > i or head[j] < first_piece):
-                pairs[count, 0], pairs[count, 1] = min(i, j), max(i, j)
+            if clock[j].island != clock[i].island and (j > i or clock[j].first_segment < first_segment):
+                c = found[count]
+                c.i, c.j, c.slot, c.time = min(i, j), max(i, j), -1, LOOK_CLOSER
                 count += 1
-    return pairs[:count]
+    return found[:count]
 
 
 @kernel
-def _is_near(position, anchor, leash, bulge, period, i):
-    """Whether a place is on the leash of particle ``i``, and the tops of parabolas to and from there are."""
-    return norm(nearest_image(sub(position, load_vec3(anchor, i)), period)) + bulge <= leash[i]
+def _is_within(position, reference, bulge, period):
+    """Whether a position is within the skin about a reference position, and the tops of parabolas near it are."""
+    offset = nearest_image(sub(position, (reference[0], reference[1], reference[2])), period)
+    return norm(offset) + bulge <= reference[3]
 
 
 @kernel
-def _follow_paths(
-    log_piece, following, head, state, acceleration, radius, place, anchor, leash, period, duration, ball, whom,
-    first, last,
-):  # fmt: skip
-    """See ``follow_paths``, of particles ``whom[first:last]``.
+def _bound_path(system, paths, reference, i, duration):
+    """How far particle ``i`` goes on its path at most [m], and whether that stays within its skin.
 
     A parabola between two points on it is farther out than both by at most a t^2 / 8.
     """
-    log_piece, following, head, state, acceleration = without_refcounts(
-        (log_piece, following, head, state, acceleration)
-    )
-    radius, place, anchor, leash, period, ball, whom = without_refcounts(
-        (radius, place, anchor, leash, period, ball, whom)
-    )
-    on_leash = True
+    segment, displacement, within = paths.clock[i].first_segment, 0.0, True
+    period = system.domain[0].period
+    if segment < 0:
+        b = system.body[i]
+        return free_displacement(to_vec3(b.velocity), norm(free_acceleration(system, b)), duration), True
+    while segment >= 0:
+        following = paths.segment[segment].next
+        time = _segment_end(paths, segment, duration) - paths.segment[segment].start
+        position, _, velocity, _, acceleration, _ = path_of_segment(system, paths.segment[segment])
+        displacement += free_displacement(velocity, norm(acceleration), time)
+        bulge = 0.125 * norm(acceleration) * time * time
+        end = axpy(axpy(position, velocity, time), acceleration, 0.5 * time * time)
+        within = within and _is_within(position, reference, bulge, period)
+        within = within and _is_within(end, reference, bulge, period)
+        segment = following
+    return displacement, within
+
+
+@entry_kernel
+def _bound_paths(system, paths, neighbours, bound, indices, duration, first, last):
+    """See ``bound_paths``, of particles ``indices[first:last]``."""
+    system, paths, neighbours, bound, indices = without_refcounts((system, paths, neighbours, bound, indices))
+    all_within = True
     for k in range(first, last):
-        i = whom[k]
-        piece, way = head[i], 0.0
-        if piece < 0:
-            way = free_way(load_vec3(state.velocity, i), load_vec3(acceleration, i), duration)
-        while piece >= 0:
-            after = following[piece]
-            time = (log_piece[after, 0] if after >= 0 else duration) - log_piece[piece, 0]
-            position, _, velocity, _, pull = path_of_piece(log_piece, piece)
-            way += free_way(velocity, pull, time)
-            bulge = 0.125 * norm(pull) * time * time
-            end = axpy(axpy(position, velocity, time), pull, 0.5 * time * time)
-            on_leash = on_leash and _is_near(position, anchor, leash, bulge, period, i)
-            on_leash = on_leash and _is_near(end, anchor, leash, bulge, period, i)
-            piece = after
-        ball[place[i], 3] = radius[i] + way
-    return on_leash
+        i = indices[k]
+        displacement, within = _bound_path(system, paths, neighbours.reference[i], i, duration)
+        all_within = all_within and within
+        bound[neighbours.place[i]].reach = system.body[i].radius + displacement
+    return all_within
 
 
-def follow_paths(where: Where, neighbours: Neighbours, ball: np.ndarray, whom: np.ndarray, duration: float) -> bool:
-    """Let the balls of particles ``whom`` hold the paths they have taken; whether these stayed on their leashes."""
-    _, world, constants, state, course, log = where
-    at = neighbours
-    arguments = (
-        log.piece, log.following, course.head, state, course.acceleration, constants.radius,
-        at.lists.place, at.anchor, at.leash, world.period, duration, ball, whom,
-    )  # fmt: skip
-    return all(ThreadTeam(len(whom)).each(lambda _, first, last: _follow_paths(*arguments, first, last), len(whom)))
-
-
-def _met(
-    where: Where, pairs: np.ndarray, normals: np.ndarray, slots: np.ndarray, times: np.ndarray, duration: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Those of the pairs that meet, and when, with the times of -1 filled in (see ``_look_closer``)."""
-    arguments = pairs, normals, slots, times, duration
-    crew = ThreadTeam(_LOOK * len(pairs))
-    # Some pairs take far longer than others: threads that are done take on more.
-    crew.each(
-        lambda _, first, last: _look_closer(*where, *arguments, np.empty((MAX_MANIFOLD, 3)), first, last),
-        len(pairs),
-        4 * crew.threads,
+def bound_paths(
+    system: System, paths: Paths, neighbours: NeighbourList, bound: np.ndarray, indices: np.ndarray, duration: float
+) -> bool:
+    """Let the swept bounds of particles hold the paths they have taken; whether these stayed within their skins."""
+    return all(
+        ThreadTeam(len(indices)).each(
+            lambda _, first, last: _bound_paths(system, paths, neighbours, bound, indices, duration, first, last),
+            len(indices),
+        )
     )
-    meet = times < np.inf
-    return pairs[meet], times[meet]
 
 
-def first_meetings(
-    where: Where, neighbours: Neighbours, ball: np.ndarray, standing: np.ndarray, duration: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Who meets whom within ``duration`` [s] if all go on as they are: pairs (m, 2), sorted, and times (m,).
-
-    Partners below 0 are walls. ``ball`` (n, 8) is filled in (see sieve.py). ``standing`` (n,) says who settles
-    together: they do not meet.
-    """
-    table, world, constants, state, course, _ = where
-    count, at = len(constants.radius), neighbours
-    moving = constants.radius, state.position, state.velocity, course.acceleration
-    crew = ThreadTeam(count)
-    alike = all(crew.each(lambda _, first, last: balls(*moving, at.lists.place, duration, ball, first, last), count))
-    among = (
-        course.acceleration,
-        alike,
-        ball,
-        standing,
-        at.lists.particle,
-        at.later_start,
-        at.later,
-        world.period,
-        duration,
-    )
-    parts = crew.each(lambda _, first, last: sieve(table.kind, constants.shape, *among, first, last), count)
-    if (world.boundary == WALL).any():
-        walls = table.kind, constants.shape, *moving, standing, world.lower, world.upper, world.boundary, duration
-        parts += crew.each(lambda _, first, last: sieve_walls(*walls, first, last), count)
-    pairs, slots, times = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    pairs, times = _met(where, pairs, neighbours.normal, slots, times, duration)
-    order = np.argsort(pairs[:, 0] * (count + 6) + pairs[:, 1])
-    return pairs[order], times[order]
-
-
-def missed_meetings(
-    where: Where, neighbours: Neighbours, ball: np.ndarray, whom: np.ndarray, first_piece: int, duration: float
+def _colliding(
+    system: System, paths: Paths, normals: np.ndarray, parts: list[np.ndarray], duration: float
 ) -> np.ndarray:
-    """Pairs (m, 2) that particles ``whom`` make with others of other islands, whatever either has met meanwhile.
+    """Those of the candidates that collide, with the times of LOOK_CLOSER filled in."""
+    candidates = np.concatenate(parts)
+    team = ThreadTeam(PAIR_COST * len(candidates))
+    # Some pairs take far longer than others: threads that are done take on more.
+    team.each(
+        lambda _, first, last: _look_closer(system, paths, normals, candidates, duration, first, last),
+        len(candidates),
+        4 * team.threads,
+    )
+    return candidates[candidates["time"] < np.inf]
 
-    ``whom`` has all those whose pieces of path begin with ``first_piece`` or later, and any whose pieces were undone.
+
+def predict(
+    system: System, paths: Paths, neighbours: NeighbourList, bound: np.ndarray, standing: np.ndarray, duration: float
+) -> Predicted:
+    """All first impacts within ``duration`` [s] if every body goes on as it is.
+
+    ``bound`` (n,) BOUND is filled in. ``standing`` (n,) says what settles together: that does not collide.
     """
-    _, world, _, _, course, _ = where
-    arguments = course.island, course.head, first_piece, ball, world.period, neighbours.lists, whom
-    parts = ThreadTeam(len(whom)).each(lambda _, first, last: _across(*arguments, first, last), len(whom))
-    pairs = np.concatenate(parts)
-    nowhere = np.full(len(pairs), -1, dtype=np.int64)
-    met, _ = _met(where, pairs, neighbours.normal, nowhere, np.full(len(pairs), -1.0), duration)
-    return met
+    team = ThreadTeam(system.bounded)
+    alike = all(
+        team.each(
+            lambda _, first, last: write_bounds(system, neighbours.place, duration, bound, first, last), system.bounded
+        )
+    )
+    parts = team.each(
+        lambda _, first, last: cull_pairs(system, neighbours, bound, standing, alike, duration, first, last),
+        system.bounded,
+    )
+    if len(system.body) > system.bounded:
+        parts += team.each(
+            lambda _, first, last: cull_half_spaces(system, standing, duration, first, last), system.particles
+        )
+    found = _colliding(system, paths, neighbours.normal, parts, duration)
+    found = found[np.argsort(found["i"] * len(system.body) + found["j"])]
+    first_row = np.full(system.particles, -1, dtype=np.int64)
+    starts = np.flatnonzero(np.diff(found["i"], prepend=-1))
+    first_row[found["i"][starts]] = starts
+    return Predicted(first_row, np.column_stack((found["i"], found["j"])), found["time"].copy())
+
+
+def predict_across(
+    system: System, paths: Paths, neighbours: NeighbourList, bound: np.ndarray, moved: tuple[np.ndarray, int],
+    duration: float,
+) -> np.ndarray:  # fmt: skip
+    """Pairs (m, 2) of particles of different islands that collide after all, on the paths they have taken.
+
+    ``moved`` are the particles, and their first path segment: all those whose segments begin with it or later, and any
+    whose segments were undone.
+    """
+    indices, first_segment = moved
+    parts = ThreadTeam(len(indices)).each(
+        lambda _, first, last: _across(system, paths, first_segment, bound, neighbours, indices, first, last),
+        len(indices),
+    )
+    found = _colliding(system, paths, neighbours.normal, parts, duration)
+    return np.column_stack((found["i"], found["j"]))

@@ -7,260 +7,330 @@ import math
 
 import numpy as np
 
-from particlesim.core.constants import MAX_IMPACTS, MAX_SLOW_IMPACTS, SIMULTANEOUS
-from particlesim.core.jit import kernel, without_refcounts
-from particlesim.core.math3d import grow, load_vec3, store_quat, store_vec3
-from particlesim.dynamics.ccd.pair_impact import body_of, later, pair_meets, wall_meets
-from particlesim.dynamics.contact.impact import NOTHING, STRUCK, answer, let_go
-from particlesim.dynamics.contact.sphere_pair import answer_two, meet_alone
-from particlesim.dynamics.events.paths import NOTHING_MET, PIECE, UNCHAINED, path_of_state, write_piece
-from particlesim.geometry.narrow_phase.gjk import NO_CORNERS
-from particlesim.model.touching import wall_as_partner
+from particlesim.core.constants import MAX_MANIFOLD
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
+from particlesim.core.math3d import dot, grow_records, set_vec3, to_vec3
+from particlesim.dynamics.ccd.pair_impact import next_impact
+from particlesim.dynamics.contact.impact import MAX_CONTACTS, NOTHING, STRUCK, WALLS, new_moment, resolve_contacts
+from particlesim.dynamics.contact.sphere_pair import resolve_sphere_pair, strike_alone
+from particlesim.dynamics.events.paths import SEGMENT, UNCHAINED, UNDISTURBED, write_segment
+from particlesim.dynamics.settings import MAX_IMPACTS, MAX_SLOW_IMPACTS, SIMULTANEOUS
+from particlesim.geometry.narrow_phase.gjk import NO_SIMPLEX
+from particlesim.geometry.support import half_space_plane
+from particlesim.model.bodies import KINEMATIC, placed
+from particlesim.model.free_motion import advance_path, path_of_body, place_on_path, set_pose
+
+# An event is (time, i, j, stamps): when particle i and body j collide, and the sum of their stamps when that was
+# predicted.
 
 
 @kernel
-def _is_current(stamp, event):
-    """Whether neither of its partners has been deflected since an impact was foretold."""
+def _stamps(clock, i, j):
+    return clock[i].stamp + clock[j].stamp
+
+
+@kernel
+def _is_current(clock, event):
+    """Whether neither of its bodies has been deflected since an event was predicted."""
     _, i, j, stamps = event
-    return stamp[i] + (stamp[j] if j >= 0 else 0) == stamps
+    return _stamps(clock, i, j) == stamps
 
 
 @kernel
-def _among(whom, size, i):
-    """Whether particle ``i`` is one of the first ``size``."""
+def _among(indices, size, i):
+    """Whether body ``i`` is one of the first ``size``."""
     found = False
     for k in range(size):
-        found = found or whom[k] == i
+        found = found or indices[k] == i
     return found
 
 
-@kernel(inline=True)
-def _foretell(table, world, constants, state, course, lists, whom, done, soonest, duration, heap, points):
-    """Put the next impacts of particle ``whom[done]`` with its island and with the walls on the heap.
+# ---- prediction ----------------------------------------------------------------------------------------------------
 
-    Those with ``whom[:done]`` are there already; impacts sooner than ``soonest`` [s] from now are none.
+
+@kernel
+def _predict_pair(system, clock, i, j, horizon, queue, points):
+    """Put the next impact of two bodies on the queue if it comes in the horizon (soonest, end) from the clock of i."""
+    now = max(system.body[i].time, system.body[j].time)
+    soonest, end = horizon
+    a, b = system.body[min(i, j)], system.body[max(i, j)]
+    path_i = advance_path(path_of_body(system, i), to_vec3(system.body[i].principal_inertia), now - system.body[i].time)
+    path_j = advance_path(path_of_body(system, j), to_vec3(system.body[j].principal_inertia), now - system.body[j].time)
+    paths = (path_i, path_j) if i < j else (path_j, path_i)
+    time = next_impact(system, a, b, paths, end - now, NO_SIMPLEX, points)
+    if soonest <= time < math.inf:
+        heapq.heappush(queue, (now + time, min(i, j), max(i, j), _stamps(clock, i, j)))
+
+
+@kernel
+def _predict(system, clock, neighbours, moment, done, horizon, queue):
+    """Put the next impacts of particle ``moment.indices[done]`` with its island and with obstacles on the queue.
+
+    Those with ``moment.indices[:done]`` are there already; impacts sooner than the first of the ``horizon`` are none.
     """
-    island, stamp, clock = course.island, course.stamp, course.clock
-    i = whom[done]
-    kind, lower, upper, boundary = table.kind, world.lower, world.upper, world.boundary
-    now = clock[i]
-    path = path_of_state(state, course.acceleration, i)
-    body = body_of(constants, i)
-    place = lists.place[i]
-    for near in range(lists.start[place], lists.start[place + 1]):
-        j = lists.particle[lists.other[near]]
-        if island[j] != island[i] or _among(whom, done, j):
-            continue
-        moments = load_vec3(constants.inertia, j)
-        path_j = later(path_of_state(state, course.acceleration, j), moments, now - clock[j])
-        body_j = body_of(constants, j)
-        one, on, two, upon = body, path, body_j, path_j
-        if j < i:
-            one, on, two, upon = body_j, path_j, body, path
-        time = pair_meets(
-            table, world, kind[one[0]], one, on, kind[two[0]], two, upon, duration - now, NO_CORNERS, points
-        )
-        if soonest <= time < math.inf:
-            heapq.heappush(heap, (now + time, min(i, j), max(i, j), stamp[i] + stamp[j]))
-    for wall in range(6):
-        time = wall_meets(table, world, lower, upper, boundary, kind[body[0]], body, path, wall, duration - now, points)
-        if soonest <= time < math.inf:
-            heapq.heappush(heap, (now + time, i, wall_as_partner(wall), stamp[i]))
+    points = np.empty((MAX_MANIFOLD, 3))
+    i = moment.indices[done]
+    place = neighbours.place[i]
+    for near in range(neighbours.start[place], neighbours.start[place + 1]):
+        j = neighbours.body[neighbours.other[near]]
+        if j >= system.particles or (clock[j].island == clock[i].island and not _among(moment.indices, done, j)):
+            _predict_pair(system, clock, i, j, horizon, queue, points)
+    for j in range(system.bounded, len(system.body)):
+        _predict_pair(system, clock, i, j, horizon, queue, points)
 
 
 @kernel
-def _joins(event, whom, size):
-    """Whether an impact shares a particle with those of the moment."""
-    return _among(whom, size, event[1]) or (event[2] >= 0 and _among(whom, size, event[2]))
+def _begin(predicted, clock, members, queue):
+    """Put the impacts on the paths that all members are on at the start on an empty queue."""
+    first, pair, time = predicted
+    for i in members:
+        k = first[i]
+        while 0 <= k < len(pair) and pair[k, 0] == i:
+            heapq.heappush(queue, (time[k], i, pair[k, 1], _stamps(clock, i, pair[k, 1])))
+            k += 1
+
+
+# ---- the events of one moment --------------------------------------------------------------------------------------
 
 
 @kernel
-def _take(event, contacts, count, whom, size):
-    """Add an impact to those of the moment; returns how many particles these concern."""
-    contacts[count, 0], contacts[count, 1] = event[1], event[2]
+def _joins(system, event, moment, size):
+    """Whether an event shares a particle with those of the moment; obstacles tie nothing together."""
+    i, j = event[1], event[2]
+    return _among(moment.indices, size, i) or (j < system.particles and _among(moment.indices, size, j))
+
+
+@kernel
+def _take(event, moment, count, size):
+    """Add an event to those of the moment; returns how many bodies these concern."""
+    moment.pair[count, 0], moment.pair[count, 1] = event[1], event[2]
     for i in event[1:3]:
-        if i >= 0 and not _among(whom, size, i):
-            whom[size] = i
+        if not _among(moment.indices, size, i):
+            moment.indices[size] = i
             size += 1
     return size
 
 
 @kernel
-def _moment(heap, stamp, within, contacts, whom):
-    """Take the earliest impact off the heap, and those ``within`` [s] of it that hang together with it.
+def _pop_simultaneous(system, clock, queue, within, moment):
+    """Take the earliest event off the queue, and those ``within`` [s] of it that hang together with it.
 
-    Returns (time, number of contacts, number of particles); there are none if nothing is left.
+    Returns (time, number of contacts, number of bodies); there are none if nothing is left.
     """
-    while len(heap) > 0 and not _is_current(stamp, heap[0]):
-        heapq.heappop(heap)
-    if len(heap) == 0:
+    while len(queue) > 0 and not _is_current(clock, queue[0]):
+        heapq.heappop(queue)
+    if len(queue) == 0:
         return 0.0, 0, 0
-    first = heapq.heappop(heap)
-    size = _take(first, contacts, 0, whom, 0)
+    first = heapq.heappop(queue)
+    size = _take(first, moment, 0, 0)
     count = 1
-    if len(heap) == 0 or heap[0][0] > first[0] + within:
+    if len(queue) == 0 or queue[0][0] > first[0] + within:
         return first[0], count, size
     waiting = [first]
     waiting.pop()
-    while len(heap) > 0 and heap[0][0] <= first[0] + within:
-        event = heapq.heappop(heap)
-        if _is_current(stamp, event):
+    while len(queue) > 0 and queue[0][0] <= first[0] + within:
+        event = heapq.heappop(queue)
+        if _is_current(clock, event):
             waiting.append(event)
     k = 0
     while k < len(waiting):
-        if count < len(contacts) and _joins(waiting[k], whom, size):
-            size = _take(waiting.pop(k), contacts, count, whom, size)
+        if count < MAX_CONTACTS and _joins(system, waiting[k], moment, size):
+            size = _take(waiting.pop(k), moment, count, size)
             count += 1
             k = 0
         else:
             k += 1
     for event in waiting:
-        heapq.heappush(heap, event)
+        heapq.heappush(queue, event)
     return first[0], count, size
 
 
 @kernel
-def _bring(state, course, constants, i, time):
+def _advance_to(system, i, time):
     """Bring particle ``i`` along its path to ``time``."""
-    since = time - course.clock[i]
-    course.clock[i] = time
+    b = system.body[i]
+    since = time - b.time
+    b.time, b.disturbed = time, 1
     if since != 0.0:
-        path = path_of_state(state, course.acceleration, i)
-        position, turn, velocity, _, _ = later(path, load_vec3(constants.inertia, i), since)
-        store_vec3(state.position, i, position)
-        store_quat(state.orientation, i, turn)
-        store_vec3(state.velocity, i, velocity)
+        position, orientation, velocity = place_on_path(path_of_body(system, i), to_vec3(b.principal_inertia), since)
+        set_pose(b, position, orientation, velocity)
 
 
 @kernel
-def _begin(met, times, first_met, stamp, members, heap):
-    """Put the impacts on the paths that all members are on at the start on an empty heap."""
-    for i in members:
-        k = first_met[i]
-        while 0 <= k < len(met) and met[k, 0] == i:
-            j = met[k, 1]
-            heapq.heappush(heap, (times[k], i, j, stamp[i] + (stamp[j] if j >= 0 else 0)))
-            k += 1
+def _gather_actors(system, moment, count, size, time):
+    """Copy the records of the moment's bodies as they are at ``time``, and refer its contacts to them."""
+    for k in range(size):
+        i = moment.indices[k]
+        moment.actor[k] = system.body[i]
+        if system.body[i].kind == KINEMATIC:
+            b = moment.actor[k]
+            set_pose(b, *place_on_path(path_of_body(system, i), to_vec3(b.principal_inertia), time))
+    for c in range(count):
+        for k in range(size):
+            if moment.indices[k] == moment.pair[c, 0]:
+                moment.contact[c].a = k
+            if moment.indices[k] == moment.pair[c, 1]:
+                moment.contact[c].b = k
 
 
 @kernel
-def _halt(state, course, constants, members, time, duration, piece, particle, pieces):
-    """Let the members stand where they are at ``time`` until the end of the stretch; returns how many pieces there are.
+def wake(system, b, left, accumulator):
+    """Let gravity act again on a particle that was struck with ``left`` [s] of the substep to go.
 
-    They keep their velocities, but nothing can get into anything else.
+    If it rested, it has had its share of gravity for the whole substep. What it weighs is no longer borne by the walls
+    that gravity presses against.
     """
-    for i in members:
-        if course.head[i] == NOTHING_MET:
-            write_piece(piece, pieces, 0.0, state, course.acceleration, i)
-            particle[pieces, 0] = i
-            pieces += 1
-            course.head[i] = UNCHAINED
-        _bring(state, course, constants, i, time)
-        course.clock[i] = duration
-        write_piece(piece, pieces, time, state, course.acceleration, i)
-        for column in range(8, PIECE):
-            piece[pieces, column] = 0.0
-        particle[pieces, 0] = i
-        pieces += 1
-    return pieces
+    gravity = to_vec3(system.domain[0].gravity)
+    if b.resting != 0:
+        for k in range(system.bounded, len(system.body)):
+            wall = system.body[k]
+            load = -dot(half_space_plane(system.shapes, placed(wall))[0], gravity)
+            if wall.wall >= 0 and load > 0.0:
+                accumulator[WALLS + wall.wall] -= b.mass * load * left
+    b.resting = 0
+
+
+# ---- an island -----------------------------------------------------------------------------------------------------
 
 
 @kernel
-def run_islands(
-    table,
-    world,
-    constants,
-    state,
-    course,
-    lists,
-    met,
-    times,
-    first_met,
-    edges,
-    member,
-    duration,
-    tally,
-    points,
-    first,
-    last,
-):
-    """Carry out the impacts of islands ``first .. last`` within ``duration`` [s].
+def _open_segments(system, clock, moment, size, time, segments):
+    """Bring the particles of the moment to ``time``; those struck for the first time get a segment of how they came.
 
-    The members of island ``k`` are ``member[edges[k]:edges[k + 1]]``; ``met`` (m, 2), ``times`` and ``first_met`` are
-    the meetings on the paths of the start, ``lists`` those of the neighbours. Adds to the row of
-    ``tally`` (n, TALLY) of each island's first member.
-    Returns the pieces of path and whose they are, and how many islands were left with impacts to answer.
+    ``segments`` are the room for them and how many there are; returns how many there are then.
     """
-    table, world, constants, state, course = without_refcounts((table, world, constants, state, course))
-    lists, met, times, first_met = without_refcounts((lists, met, times, first_met))
-    edges, member, tally, points = without_refcounts((edges, member, tally, points))
-    stamp, head = course.stamp, course.head
-    contacts, whom = np.empty((64, 2), dtype=np.int64), np.empty(128, dtype=np.int64)
-    piece, particle = np.empty((256, PIECE)), np.empty((256, 1), dtype=np.int64)
-    pieces = unfinished = 0
-    heap = [(0.0, 0, 0, 0)]
-    for k in range(first, last):
-        heap.clear()
-        members = member[edges[k] : edges[k + 1]]
-        i, j = min(members[0], members[-1]), max(members[0], members[-1])
-        if len(members) == 2 and meet_alone(table.kind, world, constants.shape, met, first_met, i, j):
-            while pieces + 4 > len(piece):
-                piece, particle = grow(piece), grow(particle)
-            if answer_two(
-                world, constants, state, course, i, j, times[first_met[i]], duration, tally[i], piece, particle, pieces
-            ):
-                pieces += 4
-                continue
-        _begin(met, times, first_met, stamp, members, heap)
-        time = 0.0
-        left, slow_left = MAX_IMPACTS * len(members), MAX_SLOW_IMPACTS * len(members)
-        while left > 0:
-            time, count, size = _moment(heap, stamp, SIMULTANEOUS * duration, contacts, whom)
-            if count == 0:
-                break
-            left -= 1
-            while pieces + 2 * size > len(piece):
-                piece, particle = grow(piece), grow(particle)
-            for m in range(size):
-                i = whom[m]
-                if head[i] == NOTHING_MET:
-                    write_piece(piece, pieces, 0.0, state, course.acceleration, i)
-                    particle[pieces, 0] = i
-                    pieces += 1
-                    head[i] = UNCHAINED
-                _bring(state, course, constants, i, time)
-            outcome = answer(
-                table,
-                world,
-                constants,
-                state,
-                course.acceleration,
-                contacts,
-                count,
-                whom,
-                size,
-                slow_left <= 0,
-                course.impacts,
-                tally[members[0]],
-            )
-            slow_left -= outcome != STRUCK
-            if outcome == NOTHING and slow_left < 0:
-                continue
-            for m in range(size):
-                i = whom[m]
-                stamp[i] += 1
-                if outcome != NOTHING:
-                    let_go(world, constants, course.acceleration, i, duration - time, tally[members[0]])
-                write_piece(piece, pieces, time, state, course.acceleration, i)
-                particle[pieces, 0] = i
-                pieces += 1
-            # What touches and was found not to approach must not be foretold for this moment again.
+    segment, used = segments
+    for m in range(size):
+        i = moment.indices[m]
+        if i < system.particles:
+            if clock[i].first_segment == UNDISTURBED:
+                write_segment(segment[used], system.body[i], i, 0.0)
+                used += 1
+                clock[i].first_segment = UNCHAINED
+            _advance_to(system, i, time)
+    return used
+
+
+@kernel
+def _deflect(system, clock, moment, m, time, segment):
+    """Take what became of actor ``m`` over into its record, and write the segment that begins with it."""
+    i = moment.indices[m]
+    b, after = system.body[i], moment.actor[m]
+    set_vec3(b.velocity, to_vec3(after.velocity))
+    set_vec3(b.angular_momentum, to_vec3(after.angular_momentum))
+    clock[i].impacts += moment.struck[m]
+    clock[i].stamp += 1
+    write_segment(segment, b, i, time)
+
+
+@kernel
+def _freeze(system, clock, members, interval, segments):
+    """Let the members stand where they are at a time until the end of an interval (time, end).
+
+    They keep their velocities, but nothing can get into anything else. Returns how many segments there are then.
+    """
+    segment, used = segments
+    time, end = interval
+    for i in members:
+        b = system.body[i]
+        if clock[i].first_segment == UNDISTURBED:
+            write_segment(segment[used], b, i, 0.0)
+            used += 1
+            clock[i].first_segment = UNCHAINED
+        _advance_to(system, i, time)
+        b.time = end
+        s = segment[used]
+        write_segment(s, b, i, time)
+        s.resting = 1
+        for axis in range(3):
+            s.velocity[axis] = s.angular_momentum[axis] = 0.0
+        used += 1
+    return used
+
+
+@kernel
+def _resolve_moment(system, clock, found, moment, budget, interval, accumulator, segments):
+    """Resolve the contacts of a moment ``found`` (time, contacts, bodies) and write what becomes of its particles.
+
+    Returns the outcome, whether anything was written, how many segments there are then, and the slow impacts left.
+    """
+    time, count, size = found
+    segment, used = segments
+    used = _open_segments(system, clock, moment, size, time, segments)
+    _gather_actors(system, moment, count, size, time)
+    outcome = resolve_contacts(system, moment, count, size, budget <= 0, accumulator)
+    budget -= outcome != STRUCK
+    if outcome == NOTHING and budget < 0:
+        return outcome, False, used, budget
+    for m in range(size):
+        i = moment.indices[m]
+        if i < system.particles:
+            if outcome != NOTHING:
+                wake(system, system.body[i], interval - time, accumulator)
+            _deflect(system, clock, moment, m, time, segment[used])
+            used += 1
+    return outcome, True, used, budget
+
+
+@kernel
+def _run_island(system, clock, neighbours, members, duration, queue, moment, segments):
+    """Carry an island whose first events are on the queue through its impacts.
+
+    ``segments`` are (room for them, how many there are, the accumulator). Returns the room, how many there are then,
+    and whether impacts were left.
+    """
+    segment, used, accumulator = segments
+    left, budget = MAX_IMPACTS * len(members), MAX_SLOW_IMPACTS * len(members)
+    time = 0.0
+    while left > 0:
+        time, count, size = _pop_simultaneous(system, clock, queue, SIMULTANEOUS * duration, moment)
+        if count == 0:
+            return segment, used, False
+        left -= 1
+        while used + 2 * size > len(segment):
+            segment = grow_records(segment)
+        outcome, written, used, budget = _resolve_moment(
+            system, clock, (time, count, size), moment, budget, duration, accumulator, (segment, used)
+        )
+        if written:
+            # What touches and was found not to approach must not be predicted for this moment again.
             soonest = SIMULTANEOUS * duration if outcome == NOTHING else 0.0
             for m in range(size):
-                _foretell(table, world, constants, state, course, lists, whom, m, soonest, duration, heap, points)
-        if left == 0:
-            unfinished += 1
-            while pieces + 2 * len(members) > len(piece):
-                piece, particle = grow(piece), grow(particle)
-            pieces = _halt(state, course, constants, members, time, duration, piece, particle, pieces)
-    return piece[:pieces], particle[:pieces, 0], unfinished
+                if moment.indices[m] < system.particles:
+                    _predict(system, clock, neighbours, moment, m, (soonest, duration), queue)
+    while used + 2 * len(members) > len(segment):
+        segment = grow_records(segment)
+    return segment, _freeze(system, clock, members, (time, duration), (segment, used)), True
+
+
+@entry_kernel
+def run_islands(system, clock, neighbours, predicted, islands, duration, accumulator, block):
+    """Carry out the impacts of the islands of a block (first, last) within ``duration`` [s].
+
+    ``predicted`` are the impacts on the paths of the start. Adds to the row of ``accumulator`` (n, ACCUMULATED) of each
+    island's first member. Returns the path segments, and how many islands were left with impacts to resolve.
+    """
+    system, clock, neighbours, predicted, islands, accumulator = without_refcounts(
+        (system, clock, neighbours, predicted, islands, accumulator)
+    )
+    moment = new_moment()
+    segment = np.empty(256, dtype=SEGMENT)
+    used = unfinished = 0
+    queue = [(0.0, 0, 0, 0)]
+    for k in range(block[0], block[1]):
+        queue.clear()
+        members = islands.member[islands.start[k] : islands.start[k + 1]]
+        i, j = min(members[0], members[-1]), max(members[0], members[-1])
+        if len(members) == 2 and strike_alone(system, predicted, i, j):
+            while used + 4 > len(segment):
+                segment = grow_records(segment)
+            interval = predicted.time[predicted.first[i]], duration
+            if resolve_sphere_pair(system, clock, i, j, interval, accumulator[i], segment[used:]):
+                used += 4
+                continue
+        _begin(predicted, clock, members, queue)
+        segment, used, left = _run_island(
+            system, clock, neighbours, members, duration, queue, moment, (segment, used, accumulator[members[0]])
+        )
+        unfinished += left
+    return segment[:used], unfinished

@@ -1,4 +1,7 @@
-"""Islands: particles whose impacts hang together. What happens in one does not touch the others."""
+"""Islands: particles whose impacts hang together. What happens in one does not touch the others.
+
+Obstacles join nothing: two particles that strike the same wall are independent.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.core.jit import kernel
-from particlesim.dynamics.events.paths import Course
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 
 
 class Islands(NamedTuple):
@@ -18,89 +20,94 @@ class Islands(NamedTuple):
 
 
 @kernel
-def _island_of(island, i):
+def _root(clock, i):
     """The smallest particle of an island; on the way each particle is led there more directly."""
-    while island[i] != i:
-        island[i] = island[island[i]]
-        i = island[i]
+    while clock[i].island != i:
+        clock[i].island = clock[clock[i].island].island
+        i = clock[i].island
     return i
 
 
-@kernel
-def _unite(island, ring, met):
-    """Join the islands of particles that meet; ``island`` (n,) leads from each to a smaller one or itself.
+@entry_kernel
+def _unite(clock, pairs, particles):
+    """Join the islands of pairs of particles; ``clock.island`` leads from each to a smaller one or itself.
 
-    (R. E. Tarjan, Journal of the ACM 22 (1975) 215-225.) ``ring`` leads round the members of an island: two rings
-    become one by an exchange of what follows two of their members.
+    (R. E. Tarjan, Journal of the ACM 22 (1975) 215-225.) ``next_in_island`` leads round the members of an island: two
+    rings become one by an exchange of what follows two of their members.
     """
-    for k in range(len(met)):
-        i, j = met[k, 0], met[k, 1]
-        if j >= 0:
-            a, b = _island_of(island, i), _island_of(island, j)
+    clock, pairs = without_refcounts((clock, pairs))
+    for k in range(len(pairs)):
+        if pairs[k, 1] < particles:
+            a, b = _root(clock, pairs[k, 0]), _root(clock, pairs[k, 1])
             if a != b:
-                island[max(a, b)] = min(a, b)
-                ring[a], ring[b] = ring[b], ring[a]
+                clock[max(a, b)].island = min(a, b)
+                after = clock[a].next_in_island
+                clock[a].next_in_island = clock[b].next_in_island
+                clock[b].next_in_island = after
 
 
-@kernel
-def _gather(island, ring, listed, met):
-    """The islands of the first partners of pairs, in the order of the pairs, and their members: (starts, members)."""
+@entry_kernel
+def _gather(clock, pairs):
+    """The islands of the first of each pair, in the order of the pairs, and their members: (starts, members)."""
+    clock, pairs = without_refcounts((clock, pairs))
     islands = members = 0
-    for k in range(len(met)):
-        root = _island_of(island, met[k, 0])
-        if not listed[root]:
+    for k in range(len(pairs)):
+        root = _root(clock, pairs[k, 0])
+        if not clock[root].listed:
             islands += 1
             i = root
-            while not listed[i]:
-                listed[i] = True
+            while not clock[i].listed:
+                clock[i].listed = 1
                 members += 1
-                i = ring[i]
+                i = clock[i].next_in_island
     start, member = np.empty(islands + 1, dtype=np.int64), np.empty(members, dtype=np.int64)
     islands = members = 0
-    for k in range(len(met)):
-        root = _island_of(island, met[k, 0])
-        if listed[root]:
+    for k in range(len(pairs)):
+        root = _root(clock, pairs[k, 0])
+        if clock[root].listed:
             start[islands] = members
             islands += 1
             i = root
-            while listed[i]:
-                listed[i] = False
-                island[i] = root
+            while clock[i].listed:
+                clock[i].listed = 0
+                clock[i].island = root
                 member[members] = i
                 members += 1
-                i = ring[i]
+                i = clock[i].next_in_island
     start[islands] = members
     return start, member
 
 
-def unite(course: Course, met: np.ndarray) -> Islands:
-    """Join the islands of pairs (m, 2) that meet, and gather all that these concern."""
-    _unite(course.island, course.ring, met)
-    return Islands(*_gather(course.island, course.ring, course.listed, met))
+def unite(clock: np.ndarray, pairs: np.ndarray, particles: int) -> Islands:
+    """Join the islands of pairs (m, 2) that collide, and gather all that these concern."""
+    _unite(clock, pairs, particles)
+    return Islands(*_gather(clock, pairs))
 
 
-@kernel
-def newly_touched(touched, met):
-    """Mark the particles of pairs in ``touched`` (n,) bool; those that were not marked, in the order of the pairs."""
-    new = np.empty(2 * len(met), dtype=np.int64)
+@entry_kernel
+def newly_touched(clock, pairs, particles):
+    """Mark the particles of pairs as touched; those that were not marked, in the order of the pairs."""
+    clock, pairs = without_refcounts((clock, pairs))
+    new = np.empty(2 * len(pairs), dtype=np.int64)
     count = 0
-    for k in range(len(met)):
+    for k in range(len(pairs)):
         for side in range(2):
-            i = met[k, side]
-            if i >= 0 and not touched[i]:
-                touched[i] = True
+            i = pairs[k, side]
+            if i < particles and not clock[i].touched:
+                clock[i].touched = 1
                 new[count] = i
                 count += 1
     return new[:count]
 
 
-@kernel
-def add_up(tally, island, touched):
-    """The sum over islands, in the order of the particles ``touched``, of the rows of ``tally``, which become 0."""
-    total = np.zeros(tally.shape[1])
+@entry_kernel
+def add_up(accumulator, clock, touched):
+    """The sum over islands, in the order of ``touched``, of the rows of ``accumulator``, which become 0."""
+    accumulator, clock, touched = without_refcounts((accumulator, clock, touched))
+    total = np.zeros(accumulator.shape[1])
     for i in touched:
-        for column in range(tally.shape[1]):
-            if island[i] == i:
-                total[column] += tally[i, column]
-            tally[i, column] = 0.0
+        for column in range(accumulator.shape[1]):
+            if clock[i].island == i:
+                total[column] += accumulator[i, column]
+            accumulator[i, column] = 0.0
     return total

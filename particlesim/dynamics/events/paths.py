@@ -1,8 +1,8 @@
-"""Where every particle has got to within a stretch of time, and the paths it took.
+"""Path segments: where every particle has got to within a substep, and the paths it took.
 
-A stretch is the time that is computed at once. A particle that meets nothing keeps its state of the start of the
-stretch and its clock at 0. One that does has a piece of path from each of its impacts to the next: the pieces are
-kept in a log, chained particle by particle, so that the paths of any two can be compared afterwards.
+A particle that nothing strikes keeps its record of the start of the substep and its clock at 0. One that is struck has
+a path segment from each of its impacts to the next, chained particle by particle, so that the paths of any two can be
+compared afterwards.
 """
 
 from __future__ import annotations
@@ -11,145 +11,137 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.core.jit import kernel
-from particlesim.core.math3d import load_quat, load_vec3, store_quat, store_vec3
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
+from particlesim.core.math3d import set_quat, set_vec3, to_quat, to_vec3
+from particlesim.core.records import record
+from particlesim.model.prescribed_motion import NO_SWING
 
-# What stands in place of a first piece: there is none, or it is not chained yet.
-NOTHING_MET = -1
+# What stands in place of a first segment: there is none, or it is not chained yet.
+UNDISTURBED = -1
 UNCHAINED = -2
 
-# Columns of a piece: when it starts, then position, orientation, velocity, angular momentum and acceleration.
-PIECE = 17
+# Of each body within the present substep.
+CLOCK = record(
+    [
+        ("stamp", "i4"),  # how often its impacts were predicted anew
+        ("impacts", "i4"),  # impacts it has had
+        ("first_segment", "i8"),  # or UNDISTURBED
+        ("last_segment", "i8"),
+        ("island", "i8"),  # the smallest particle whose impacts hang together with its own
+        ("next_in_island", "i8"),  # the next particle of its island, round and round
+        ("listed", "i4"),  # 0 but while particles are listed
+        ("touched", "i4"),  # whether anything was found to strike it, in any round
+    ]
+)
+
+SEGMENT = record(
+    [
+        ("start", "f8"),  # [s]
+        ("position", "f8", (3,)),
+        ("orientation", "f8", (4,)),
+        ("velocity", "f8", (3,)),
+        ("angular_momentum", "f8", (3,)),
+        ("resting", "i8"),  # whether it does not fall
+        ("particle", "i8"),
+        ("next", "i8"),  # the particle's next segment, -1 if there is none
+    ]
+)
 
 
-class Course(NamedTuple):
-    """Of each particle within the present stretch; times count from its start."""
+class Paths(NamedTuple):
+    """The paths of all bodies through the present substep."""
 
-    clock: np.ndarray  # (n,) when the state describes it [s]
-    stamp: np.ndarray  # (n,) int64, how often its path was looked into anew
-    impacts: np.ndarray  # (n,) int64, impacts it has had
-    head: np.ndarray  # (n,) int64, its first piece in the log, or NOTHING_MET
-    tail: np.ndarray  # (n,) int64, its last piece
-    island: np.ndarray  # (n,) int64, the smallest particle whose impacts hang together with its own
-    ring: np.ndarray  # (n,) int64, the next particle of its island, round and round
-    listed: np.ndarray  # (n,) bool, False but while particles are listed
-    touched: np.ndarray  # (n,) bool, whether it has met anything, in any round
-    acceleration: np.ndarray  # (n, 3) [m/s^2]
+    clock: np.ndarray  # (n,) CLOCK
+    segment: np.ndarray  # (m,) SEGMENT, each particle's in the order of time; the first of a particle starts at 0
 
 
-class Log(NamedTuple):
-    """Pieces of path, each particle's in the order of time; the first of a particle starts at 0."""
-
-    piece: np.ndarray  # (m, PIECE)
-    particle: np.ndarray  # (m,) int64
-    following: np.ndarray  # (m,) int64, the particle's next piece, -1 if there is none
-
-
-def new_course(count: int, gravity: np.ndarray) -> Course:
-    """Of ``count`` particles that have met nothing."""
-    return Course(
-        clock=np.zeros(count),
-        stamp=np.zeros(count, dtype=np.int64),
-        impacts=np.zeros(count, dtype=np.int64),
-        head=np.full(count, NOTHING_MET, dtype=np.int64),
-        tail=np.full(count, NOTHING_MET, dtype=np.int64),
-        island=np.arange(count, dtype=np.int64),
-        ring=np.arange(count, dtype=np.int64),
-        listed=np.zeros(count, dtype=np.bool_),
-        touched=np.zeros(count, dtype=np.bool_),
-        acceleration=np.tile(gravity, (count, 1)),
-    )
+def new_clocks(count: int) -> np.ndarray:
+    """Of ``count`` bodies that nothing has struck, (count,) CLOCK."""
+    clock = np.zeros(count, dtype=CLOCK)
+    clock["first_segment"] = clock["last_segment"] = UNDISTURBED
+    clock["island"] = clock["next_in_island"] = np.arange(count)
+    return clock
 
 
-def empty_log() -> Log:
-    """Without any piece."""
-    return Log(np.empty((0, PIECE)), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
-
-
-@kernel
-def write_piece(piece, index, time, state, acceleration, i):
-    """Write the state of particle ``i`` as a piece that starts at ``time``."""
-    piece[index, 0] = time
-    for axis in range(3):
-        piece[index, 1 + axis] = state.position[i, axis]
-        piece[index, 8 + axis] = state.velocity[i, axis]
-        piece[index, 11 + axis] = state.angular_momentum[i, axis]
-        piece[index, 14 + axis] = acceleration[i, axis]
-    for axis in range(4):
-        piece[index, 4 + axis] = state.orientation[i, axis]
+def no_segments() -> np.ndarray:
+    """(0,) SEGMENT."""
+    return np.empty(0, dtype=SEGMENT)
 
 
 @kernel
-def path_of_piece(piece, index):
-    """Position, orientation, velocity, angular momentum and acceleration at the start of a piece."""
+def _copy_motion(source, target):
+    """Copy where a record says that a particle is, and how it moves, to another."""
+    set_vec3(target.position, to_vec3(source.position))
+    set_quat(target.orientation, to_quat(source.orientation))
+    set_vec3(target.velocity, to_vec3(source.velocity))
+    set_vec3(target.angular_momentum, to_vec3(source.angular_momentum))
+    target.resting = source.resting
+
+
+@kernel
+def write_segment(segment, b, i, start):
+    """Write body record ``b`` of particle ``i`` as a segment that starts at ``start`` [s]."""
+    segment.start = start
+    segment.particle = i
+    _copy_motion(b, segment)
+
+
+@kernel
+def path_of_segment(system, segment):
+    """The path (see model/free_motion.py) at the start of a segment."""
+    gravity = to_vec3(system.domain[0].gravity)
     return (
-        (piece[index, 1], piece[index, 2], piece[index, 3]),
-        (piece[index, 4], piece[index, 5], piece[index, 6], piece[index, 7]),
-        (piece[index, 8], piece[index, 9], piece[index, 10]),
-        (piece[index, 11], piece[index, 12], piece[index, 13]),
-        (piece[index, 14], piece[index, 15], piece[index, 16]),
+        to_vec3(segment.position),
+        to_quat(segment.orientation),
+        to_vec3(segment.velocity),
+        to_vec3(segment.angular_momentum),
+        gravity if segment.resting == 0 else (0.0, 0.0, 0.0),
+        NO_SWING,
     )
 
 
-@kernel
-def path_of_state(state, acceleration, i):
-    """Position, orientation, velocity, angular momentum and acceleration of particle ``i``."""
-    return (
-        load_vec3(state.position, i),
-        load_quat(state.orientation, i),
-        load_vec3(state.velocity, i),
-        load_vec3(state.angular_momentum, i),
-        load_vec3(acceleration, i),
-    )
-
-
-@kernel
-def _chain(course, log, first):
-    """Chain the pieces from ``first`` on to those of the same particle before them."""
-    head, tail = course.head, course.tail
-    for m in range(first, len(log.particle)):
-        i = log.particle[m]
-        log.following[m] = -1
-        if head[i] < 0:
-            head[i] = m
+@entry_kernel
+def _chain(clock, segment, first):
+    """Chain the segments from ``first`` on to those of the same particle before them."""
+    clock, segment = without_refcounts((clock, segment))
+    for m in range(first, len(segment)):
+        c = clock[segment[m].particle]
+        segment[m].next = -1
+        if c.first_segment < 0:
+            c.first_segment = m
         else:
-            log.following[tail[i]] = m
-        tail[i] = m
+            segment[c.last_segment].next = m
+        c.last_segment = m
 
 
-def extended(course: Course, log: Log, pieces: list[np.ndarray], particles: list[np.ndarray]) -> Log:
-    """The log with more pieces at its end, chained."""
-    first = len(log.particle)
-    piece = np.concatenate([log.piece, *pieces])
-    particle = np.concatenate([log.particle, *particles])
-    following = np.concatenate([log.following, np.empty(len(particle) - first, dtype=np.int64)])
-    longer = Log(piece, particle, following)
-    _chain(course, longer, first)
-    return longer
+def extended(paths: Paths, parts: list[np.ndarray]) -> Paths:
+    """The paths with more segments, chained."""
+    first = len(paths.segment)
+    segment = np.concatenate([paths.segment, *parts])
+    _chain(paths.clock, segment, first)
+    return Paths(paths.clock, segment)
 
 
-@kernel
-def rewind(course, log, state, particles):
-    """Take particles back to the start of the stretch, as if they had met nothing."""
-    for i in particles:
-        course.clock[i] = 0.0
-        course.stamp[i] = course.impacts[i] = 0
-        if course.head[i] >= 0:
-            position, turn, velocity, momentum, pull = path_of_piece(log.piece, course.head[i])
-            store_vec3(state.position, i, position)
-            store_quat(state.orientation, i, turn)
-            store_vec3(state.velocity, i, velocity)
-            store_vec3(state.angular_momentum, i, momentum)
-            store_vec3(course.acceleration, i, pull)
-            course.head[i] = NOTHING_MET
+@entry_kernel
+def rewind(paths, body, indices):
+    """Take particles back to the start of the substep, as if nothing had struck them."""
+    paths, body, indices = without_refcounts((paths, body, indices))
+    for i in indices:
+        c = paths.clock[i]
+        body[i].time, body[i].disturbed = 0.0, 0
+        c.stamp = c.impacts = 0
+        if c.first_segment >= 0:
+            _copy_motion(paths.segment[c.first_segment], body[i])
+            c.first_segment = UNDISTURBED
 
 
-@kernel
-def forget(course, particles):
-    """Let particles have met nothing, at the start of a new stretch."""
-    for i in particles:
-        course.clock[i] = 0.0
-        course.stamp[i] = course.impacts[i] = 0
-        course.head[i] = NOTHING_MET
-        course.island[i] = course.ring[i] = i
-        course.touched[i] = False
+@entry_kernel
+def forget(clock, body, indices):
+    """Let particles be undisturbed, at the start of a new substep."""
+    clock, body, indices = without_refcounts((clock, body, indices))
+    for i in indices:
+        c = clock[i]
+        body[i].time, body[i].disturbed = 0.0, 0
+        c.stamp = c.impacts = c.touched = 0
+        c.first_segment = UNDISTURBED
+        c.island = c.next_in_island = i

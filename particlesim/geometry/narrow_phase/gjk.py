@@ -1,53 +1,29 @@
-"""Distance between two convex hulls: the algorithm of Gilbert, Johnson and Keerthi.
+"""Distance between two convex cores: the algorithm of Gilbert, Johnson and Keerthi.
 
 E. G. Gilbert, D. W. Johnson, S. S. Keerthi, IEEE Journal of Robotics and Automation 4 (1988) 193-203. It walks a
-simplex of up to four corners of the difference body B - A towards the origin. The nearest point of the simplex is
-the best over all of its parts that hold the newest corner: a few more flops than Johnson's recursion, and no answer
+simplex of up to four vertices of the difference body B - A towards the origin. The nearest point of the simplex is
+the best over all of its parts that hold the newest vertex: a few more flops than Johnson's recursion, and no answer
 that lies outside the simplex, however thin it is. The vector to that point is made perpendicular to its part by
-construction, not by subtraction of nearly equal points: hulls that all but touch keep their distance and normal.
+construction, not by subtraction of nearly equal points: cores that all but touch keep their distance and normal.
 """
 
 import math
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import add, axpy, cross, dot, load_vec3, mat_transposed_vec, mat_vec, norm, scale, sub
-
-# The search ends when a corner of the difference body can be nearer than the simplex by no more than this fraction.
-_GAP = 1e-15
-
-# Every step shortens the distance or turns the direction.  Hulls of MAX_MESH_VERTICES take some 30 steps at the most.
-_MAX_STEPS = 256
-
-# Steps that only turn the direction, the distance being shortened by less than rounding: more go round in circles.
-_MAX_IDLE = 8
-
-# How uncertain a distance is by its own length, as a fraction: some units in the last place.
-_ROUNDING = 1e-14
+from particlesim.core.math3d import add, axpy, cross, dot, mat_transposed_vec, norm, scale, sub
+from particlesim.geometry.support import support_vertex, vertex_position
+from particlesim.geometry.tolerances import GJK_GAP, GJK_MAX_IDLE, GJK_MAX_STEPS, GJK_ROUNDING
 
 _ORIGIN = (0.0, 0.0, 0.0)
 
-# Corners of no simplex: how many, and the vertices of either hull that they are differences of.
-NO_CORNERS = (0, (-1, -1, -1, -1), (-1, -1, -1, -1))
+# A simplex without vertices: how many there are, and the vertices of either core that they are differences of.
+NO_SIMPLEX = (0, (-1, -1, -1, -1), (-1, -1, -1, -1))
 
 
 @kernel
-def _support(vertices, matrix, direction):
-    """The number of the vertex of a hull farthest along ``direction``; vertices (v, 3) in body axes."""
-    local = mat_transposed_vec(matrix, direction)
-    best = 0
-    farthest = -math.inf
-    for v in range(len(vertices)):
-        reach = dot(load_vec3(vertices, v), local)
-        if reach > farthest:
-            farthest = reach
-            best = v
-    return best
-
-
-@kernel
-def _vertex(vertices, size, matrix, v):
-    """Vertex ``v`` of a hull relative to its centroid, in world axes."""
-    return mat_vec(matrix, scale(load_vec3(vertices, v), size))
+def _support(table, body, direction):
+    """The number of the vertex of a turned core farthest along ``direction``, which is in world axes."""
+    return support_vertex(table, body[0], mat_transposed_vec(body[2], direction))
 
 
 @kernel
@@ -86,7 +62,7 @@ def _weigh_tetrahedron(p, a, b, c):
 
 @kernel
 def _nearest_of_simplex(simplex, newest):
-    """The nearest point to the origin of the parts of a simplex that hold corner ``newest``, its last.
+    """The nearest point to the origin of the parts of a simplex that hold vertex ``newest``, its last.
 
     Returns (squared distance, nearest point, number of corners of its part, which corners, their weights).
     """
@@ -129,7 +105,7 @@ def _replaced(four, k, new):
 
 @kernel
 def _holds(picks_a, picks_b, count, a, b):
-    """Whether the first ``count`` corners hold the difference of vertices a and b."""
+    """Whether the first ``count`` vertices of a simplex hold the difference of vertices a and b."""
     found = False
     for k in range(count):
         found = found or (picks_a[k] == a and picks_b[k] == b)
@@ -137,34 +113,25 @@ def _holds(picks_a, picks_b, count, a, b):
 
 
 @kernel
-def _weighted(vertices, size, matrix, picks, weights, count):
-    """The point that ``weights`` make of ``count`` vertices of a hull, relative to its centroid."""
+def _weighted(table, body, picks, weights, count):
+    """The point that ``weights`` make of ``count`` vertices of a turned core, from its centroid."""
     point = _ORIGIN
     for k in range(count):
-        point = axpy(point, _vertex(vertices, size, matrix, picks[k]), weights[k])
+        point = axpy(point, vertex_position(table, body, picks[k]), weights[k])
     return point
 
 
 @kernel
-def hulls_apart(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching):
-    """Whether hull b, centred at ``offset`` from hull a, is farther from it than ``touching`` [m]."""
-    length, _, _, _, _ = hull_distance(
-        vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching, True, NO_CORNERS
-    )
-    return length > touching
-
-
-@kernel
-def hull_distance(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, offset, touching, only_whether, known):
-    """Distance of hull b, centred at ``offset`` from hull a, and the nearest points relative to a's centroid.
+def core_distance(table, a, b, offset, touching, only_whether, known):
+    """Distance of core b, centred at ``offset`` from core a, and the nearest points from a's centroid.
 
     Returns (distance, direction from a to b, point of a, point of b, corners). The direction, of any length, is the one
     along which they are proven to be that far apart: near contact it is more certain than the difference of the points.
-    The corners are those of the last simplex. ``known`` are corners to begin with: those of the last simplex when the
-    hulls were a little elsewhere save most of the search.
-    The distance is 0 if they overlap, are nearer than ``touching`` [m], or if rounding ended the search farther than
-    that from a proof of the distance. With ``only_whether`` any number above ``touching`` may stand for the distance
-    of hulls that are apart: the first separating direction ends the search.
+    ``a`` and ``b`` are turned shapes (see geometry/support.py). The search begins with the simplex ``known`` and
+    returns its last one: that of the same two shapes when they were a little elsewhere saves most of the search.
+    The distance is 0 if the cores overlap, are nearer than ``touching`` [m], or if rounding ended the search farther
+    than that from a proof of the distance. With ``only_whether`` any number above ``touching`` may stand for the
+    distance of cores that are apart: the first separating direction ends the search.
     """
     simplex = (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)
     picks_a = picks_b = (-1, -1, -1, -1)
@@ -173,36 +140,36 @@ def hull_distance(vertices_a, size_a, matrix_a, vertices_b, size_b, matrix_b, of
     apart = v
     length, at_least = math.inf, -math.inf
     count = idle = 0
-    for step in range(_MAX_STEPS):
+    for step in range(GJK_MAX_STEPS):
         searched = step >= known[0]
-        a = _support(vertices_a, matrix_a, v) if searched else known[1][step]
-        b = _support(vertices_b, matrix_b, scale(v, -1.0)) if searched else known[2][step]
-        w = sub(add(offset, _vertex(vertices_b, size_b, matrix_b, b)), _vertex(vertices_a, size_a, matrix_a, a))
+        pick_a = _support(table, a, v) if searched else known[1][step]
+        pick_b = _support(table, b, scale(v, -1.0)) if searched else known[2][step]
+        w = sub(add(offset, vertex_position(table, b, pick_b)), vertex_position(table, a, pick_a))
         if searched:
             bound = dot(v, w) / norm(v)
             if bound > at_least:
                 at_least, apart = bound, v
             if only_whether and at_least > touching:
-                return at_least, v, _ORIGIN, _ORIGIN, NO_CORNERS
-            if count > 0 and length - at_least <= _GAP * length:
+                return at_least, v, _ORIGIN, _ORIGIN, NO_SIMPLEX
+            if count > 0 and length - at_least <= GJK_GAP * length:
                 break
-            if _holds(picks_a, picks_b, count, a, b):
+            if _holds(picks_a, picks_b, count, pick_a, pick_b):
                 break
         simplex = _replaced(simplex, count, w)
-        picks_a, picks_b = _replaced(picks_a, count, a), _replaced(picks_b, count, b)
+        picks_a, picks_b = _replaced(picks_a, count, pick_a), _replaced(picks_b, count, pick_b)
         shorter2, nearest, found, part, of_part = _nearest_of_simplex(simplex, count)
         shorter = math.sqrt(shorter2)
         if not searched and shorter >= length:
             continue
         idle += shorter >= length
-        if shorter > length + touching + _ROUNDING * length or idle > _MAX_IDLE:
+        if shorter > length + touching + GJK_ROUNDING * length or idle > GJK_MAX_IDLE:
             break
         simplex, picks_a, picks_b = _chosen(simplex, part), _chosen(picks_a, part), _chosen(picks_b, part)
         length, v, count, weights = shorter, nearest, found, of_part
         if length <= touching:
             break
-    if only_whether or length <= touching or length - at_least > touching + _ROUNDING * length:
+    if only_whether or length <= touching or length - at_least > touching + GJK_ROUNDING * length:
         length = 0.0
-    point_a = _weighted(vertices_a, size_a, matrix_a, picks_a, weights, count)
-    point_b = add(offset, _weighted(vertices_b, size_b, matrix_b, picks_b, weights, count))
+    point_a = _weighted(table, a, picks_a, weights, count)
+    point_b = add(offset, _weighted(table, b, picks_b, weights, count))
     return length, apart, point_a, point_b, (count, picks_a, picks_b)

@@ -1,75 +1,154 @@
-"""The exact test of any two particles: dispatch by geometry kind."""
+"""The pair table: the exact test of any two shapes.
 
-from particlesim.core.constants import SPHERE
-from particlesim.core.jit import kernel
-from particlesim.core.math3d import add, load_vec3, quat_to_matrix, scale, store_vec3
-from particlesim.geometry.narrow_phase.hull_hull import hull_hull, hull_separation, hulls_nearer
-from particlesim.geometry.narrow_phase.sphere_hull import hull_sphere
+A placed shape is a tuple (row of the shape table, size, orientation). ``offset`` is the centroid of b from that of a,
+normals point from a to b, points are from a's centroid. A half-space may be b, never a.
+Spheres have fast paths: among themselves, and against polyhedra by a walk over the faces (0.20 us on average over the
+shapes of the tests where the general search takes 0.36 us; for cubes 0.15 and 0.18).
+"""
+
+import numpy as np
+
+from particlesim.core.constants import MAX_MANIFOLD
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
+from particlesim.core.math3d import add, axpy, load_vec3, scale, store_vec3
+from particlesim.geometry.narrow_phase.contact_manifold import contact_manifold
+from particlesim.geometry.narrow_phase.core_pair import core_pair_nearer, core_pair_separation
+from particlesim.geometry.narrow_phase.gjk import NO_SIMPLEX
+from particlesim.geometry.narrow_phase.half_space import half_space_contact, half_space_points, half_space_separation
+from particlesim.geometry.narrow_phase.sphere_polyhedron import polyhedron_sphere
 from particlesim.geometry.narrow_phase.sphere_sphere import sphere_sphere
+from particlesim.geometry.support import has_faces, is_half_space, is_point, is_sphere, rounding_of
+from particlesim.geometry.tolerances import PARALLEL_TOLERANCE
 
 
 @kernel
-def nearest_image(offset, period):
-    """An offset between two particles, by the shortest way round each periodic axis."""
-    x, y, z = offset
-    # Few pairs lie on two sides of a face: the others are spared the division.
-    if abs(x) > 0.5 * period[0] and period[0] > 0.0:
-        x -= period[0] * round(x / period[0])
-    if abs(y) > 0.5 * period[1] and period[1] > 0.0:
-        y -= period[1] * round(y / period[1])
-    if abs(z) > 0.5 * period[2] and period[2] > 0.0:
-        z -= period[2] * round(z / period[2])
-    return x, y, z
+def _has_closed_form(table, a, b):
+    """Whether one of two bounded shapes is a sphere, and the other a sphere or a polyhedron."""
+    sphere_a, sphere_b = is_sphere(table, a[0]), is_sphere(table, b[0])
+    return (sphere_a and (sphere_b or has_faces(table, b[0]))) or (sphere_b and has_faces(table, a[0]))
 
 
-@kernel(inline=True)
-def _sphere_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
-    """The contact of two particles of which one at least is a sphere (see pair_contact)."""
-    if table.kind[shape_a] != SPHERE:
-        separation, normal, count = hull_sphere(table, shape_a, size_a, turn_a, size_b, offset, points)
-    elif table.kind[shape_b] != SPHERE:
-        separation, normal, count = hull_sphere(table, shape_b, size_b, turn_b, size_a, scale(offset, -1.0), points)
+@kernel
+def _sphere_contact(table, a, b, offset, points):
+    """The contact of two shapes of which one is a sphere, the other a sphere or a polyhedron (see pair_contact)."""
+    if not is_sphere(table, a[0]):
+        separation, normal, count = polyhedron_sphere(table, a, rounding_of(table, b), offset, points)
+    elif not is_sphere(table, b[0]):
+        separation, normal, count = polyhedron_sphere(table, b, rounding_of(table, a), scale(offset, -1.0), points)
         normal = scale(normal, -1.0)
         store_vec3(points, 0, add(offset, load_vec3(points, 0)))
     else:
-        separation, normal, count = sphere_sphere(size_a, size_b, offset, points)
+        separation, normal, count = sphere_sphere(rounding_of(table, a), rounding_of(table, b), offset, points)
     return separation, normal, count
 
 
 @kernel
-def pair_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
+def _has_point(table, a, b):
+    """Whether the core of one of two shapes is a point: the shapes touch in one."""
+    return is_point(table, a[0]) or is_point(table, b[0])
+
+
+@kernel
+def _point_contact(table, a, b, contact, points):
+    """Write the contact point of two shapes of which one has a point for a core (see contact_manifold); returns 1."""
+    offset, normal, separation, _ = contact
+    nearest = scale(normal, rounding_of(table, a) + 0.5 * separation)
+    if not is_point(table, a[0]):
+        nearest = axpy(offset, normal, -(rounding_of(table, b) + 0.5 * separation))
+    store_vec3(points, 0, nearest)
+    return 1
+
+
+@kernel
+def _core_contact(table, a, b, offset, points):
+    """The contact of any two bounded shapes (see pair_contact)."""
+    separation, normal, middle, _ = core_pair_separation(table, a, b, offset, NO_SIMPLEX)
+    contact = offset, normal, separation, middle
+    if _has_point(table, a, b):
+        return separation, normal, _point_contact(table, a, b, contact, points)
+    gaps = np.empty(MAX_MANIFOLD)
+    return separation, normal, contact_manifold(table, a, b, contact, (PARALLEL_TOLERANCE, 0.0), points, gaps)
+
+
+@entry_kernel
+def pair_contact(table, a, b, offset, points):
     """Separation (negative: overlap), unit normal from a to b, and number of contact points written.
 
-    ``turn`` are orientations, ``offset`` is b's centroid from a's; points are relative to a's centroid, half way
-    between the two surfaces.
+    ``points`` is (MAX_MANIFOLD, 3) [m], half way between the two surfaces; against a half-space, on the surface of a.
     """
-    if table.kind[shape_a] == SPHERE or table.kind[shape_b] == SPHERE:
-        return _sphere_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points)
-    return hull_hull(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points)
+    table, points = without_refcounts((table, points))
+    if is_half_space(table, b[0]):
+        return half_space_contact(table, a, b, offset, points)
+    if _has_closed_form(table, a, b):
+        return _sphere_contact(table, a, b, offset, points)
+    return _core_contact(table, a, b, offset, points)
 
 
-@kernel(inline=True)
-def pair_separation(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, known, points):
-    """Separation and normal as of pair_contact, without the corners of the patch; ``points`` is scratch.
+@kernel
+def pair_separation(table, a, b, offset, simplex, points):
+    """Separation and normal as of pair_contact, without the manifold, and the simplex that they were found from.
 
-    And the corners from which hulls find them sooner when they have moved a little: ``known``, or NO_CORNERS.
+    ``simplex`` is that of the same pair when it was a little elsewhere, or NO_SIMPLEX. Row 0 of ``points`` becomes half
+    way between the nearest points of two bounded shapes; the rest is scratch.
     """
-    corners = known
-    if table.kind[shape_a] == SPHERE or table.kind[shape_b] == SPHERE:
-        separation, normal, _ = _sphere_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points)
+    found = simplex
+    if is_half_space(table, b[0]):
+        separation, normal = half_space_separation(table, a, b, offset)
+    elif _has_closed_form(table, a, b):
+        separation, normal, _ = _sphere_contact(table, a, b, offset, points)
     else:
-        separation, normal, _, corners = hull_separation(
-            table, shape_a, size_a, quat_to_matrix(turn_a), shape_b, size_b, quat_to_matrix(turn_b), offset, known
-        )
-    return separation, normal, corners
+        separation, normal, middle, found = core_pair_separation(table, a, b, offset, simplex)
+        store_vec3(points, 0, middle)
+    return separation, normal, found
 
 
-@kernel(inline=True)
-def pair_overlaps(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points):
-    """Whether two particles touch or overlap; cheaper than the contact for most that do not."""
-    if table.kind[shape_a] == SPHERE or table.kind[shape_b] == SPHERE:
-        separation, _, _ = pair_contact(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, points)
+@kernel
+def pair_nearer(table, a, b, offset, distance):
+    """Whether two bounded shapes are nearer than ``distance`` [m]; 0 asks whether they touch or overlap."""
+    return core_pair_nearer(table, a, b, offset, distance)
+
+
+@kernel
+def pair_overlaps(table, a, b, offset, points):
+    """Whether two shapes touch or overlap; cheaper than the contact for most that do not. ``points`` is scratch."""
+    if is_half_space(table, b[0]) or _has_closed_form(table, a, b):
+        separation, _, _ = pair_separation(table, a, b, offset, NO_SIMPLEX, points)
         overlap = separation <= 0.0
     else:
-        overlap = hulls_nearer(table, shape_a, size_a, turn_a, shape_b, size_b, turn_b, offset, 0.0)
+        overlap = core_pair_nearer(table, a, b, offset, 0.0)
     return overlap
+
+
+@kernel
+def pair_manifold(table, a, b, offset, limits, points, gaps):
+    """All points where two shapes are near to each other, for resting contacts.
+
+    Parameters
+    ----------
+    limits : (reach [m], tilt [sine of an angle], margin [m])
+        Shapes farther apart than ``reach`` have no points; for ``tilt`` and ``margin`` see contact_manifold.
+    points : (MAX_MANIFOLD, 3) float64, written
+        Half way between bounded shapes; against a half-space, those of a within ``reach`` of it.
+    gaps : (MAX_MANIFOLD,) float64, written
+        How far apart the shapes are at each of the points [m].
+
+    Returns
+    -------
+    (separation, normal, half way between the nearest points of bounded shapes, number of points)
+    """
+    reach, tilt, margin = limits
+    separation, normal, _ = pair_separation(table, a, b, offset, NO_SIMPLEX, points)
+    middle, count = load_vec3(points, 0), 0
+    gaps[0] = separation
+    if separation > reach:
+        return separation, normal, middle, count
+    if is_half_space(table, b[0]):
+        count = half_space_points(table, a, b, offset, reach, points, gaps)
+    elif _has_closed_form(table, a, b):
+        count = 1
+    elif _has_point(table, a, b):
+        count = _point_contact(table, a, b, (offset, normal, separation, middle), points)
+    else:
+        contact = offset, normal, separation, middle
+        count = contact_manifold(table, a, b, contact, (tilt, margin), points, gaps)
+    return separation, normal, middle, count

@@ -1,8 +1,9 @@
-"""How deep two overlapping hulls are in each other: the separating axis test over all faces and edge pairs.
+"""How deep two overlapping cores are in each other: the separating axis test over all faces and edge pairs.
 
 The depth is the distance from the origin to the nearest face of the difference body B - A. Its faces are those of A,
 those of B, and one for each pair of edges whose arcs cross on the sphere of normals
 (D. Gregorius, The Separating Axis Test between Convex Polyhedra, Game Developers Conference 2013).
+A point has neither faces nor edges; a segment has one edge, whose arc of normals is a whole great circle.
 """
 
 import math
@@ -22,122 +23,204 @@ from particlesim.core.math3d import (
     scale,
     store_vec3,
     sub,
+    to_vec3,
 )
+from particlesim.geometry.support import bounding_radius, farthest_row, has_faces, vertex_position
+from particlesim.geometry.tolerances import FACE_FIRST, PARALLEL_EDGES
 
-# Edges closer to parallel than this [sine of the angle] give no direction worth having; a face normal is as good.
-_PARALLEL_EDGES = 1e-10
-
-# An edge pair must beat the best face by this fraction of the sizes: ties go to faces, whose contact is a patch.
-_FACE_FIRST = 1e-14
+_NOWHERE = (0.0, 0.0, 0.0)
+_IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 @kernel
-def _into_frame(rows, start, end, matrix, factor, offset):
-    """Rows ``start`` to ``end`` of a table turned by ``matrix``, stretched and shifted."""
-    moved = np.empty((end - start, 3))
-    for k in range(start, end):
-        store_vec3(moved, k - start, add(offset, mat_vec(matrix, scale(load_vec3(rows, k), factor))))
+def _relative_rotation(matrix_a, matrix_b):
+    """The rotation from b's body axes to a's, nine numbers by rows."""
+    x = mat_transposed_vec(matrix_a, (matrix_b[0], matrix_b[3], matrix_b[6]))
+    y = mat_transposed_vec(matrix_a, (matrix_b[1], matrix_b[4], matrix_b[7]))
+    z = mat_transposed_vec(matrix_a, (matrix_b[2], matrix_b[5], matrix_b[8]))
+    return x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]
+
+
+@kernel
+def _vertices_at(table, body, offset):
+    """Vertices of a turned core whose centroid is at ``offset``, (v, 3)."""
+    record = table.shape[body[0]]
+    moved = np.empty((record.last_vertex - record.first_vertex, 3))
+    for k in range(len(moved)):
+        store_vec3(moved, k, add(offset, vertex_position(table, body, record.first_vertex + k)))
     return moved
 
 
 @kernel
-def _best_face(normals, corners_of_faces, others):
-    """The face from whose plane ``others`` stick out farthest, by their nearest point: (separation, face).
+def _normals_at(table, body):
+    """Face normals of a turned core, (f, 3)."""
+    record = table.shape[body[0]]
+    turned = np.empty((record.last_face - record.first_face, 3))
+    for k in range(len(turned)):
+        store_vec3(turned, k, mat_vec(body[2], to_vec3(table.face[record.first_face + k].normal)))
+    return turned
 
-    ``corners_of_faces`` holds one corner of each face.
+
+@kernel
+def _best_face(table, shape, vertices, normals, others):
+    """The face of a core from whose plane ``others`` stick out farthest, by their nearest point: (separation, normal).
+
+    ``vertices`` and ``normals`` are those of the core in the same frame as ``others``. Of no faces: minus infinity.
     """
-    best, best_face = -math.inf, 0
+    record = table.shape[shape]
+    best, best_normal = -math.inf, _NOWHERE
     for f in range(len(normals)):
         n = load_vec3(normals, f)
-        nearest = math.inf
-        for v in range(len(others)):
-            nearest = min(nearest, dot(n, load_vec3(others, v)))
-        separation = nearest - dot(n, load_vec3(corners_of_faces, f))
+        corner = table.loop[table.face[record.first_face + f].first] - record.first_vertex
+        nearest = farthest_row(others, 0, len(others), scale(n, -1.0))
+        separation = dot(n, load_vec3(others, nearest)) - dot(n, load_vec3(vertices, corner))
         if separation > best:
-            best, best_face = separation, f
-    return best, best_face
+            best, best_normal = separation, n
+    return best, best_normal
 
 
 @kernel
-def _one_corner_each(table, shape, vertices):
-    """One corner of each face of a shape, from its vertices in any frame."""
-    first = table.face_start[shape]
-    corners = np.empty((table.face_start[shape + 1] - first, 3))
-    for f in range(len(corners)):
-        store_vec3(corners, f, load_vec3(vertices, table.loop[table.loop_start[first + f]]))
-    return corners
+def _edge_axis(a, along_a, outwards, b, along_b):
+    """Separation of two edges along the direction across both, and that direction, on the side of ``outwards``.
+
+    ``a`` and ``b`` are points of the edges. Minus infinity if the edges are parallel.
+    """
+    n = cross(along_a, along_b)
+    length = norm(n)
+    if length <= PARALLEL_EDGES * norm(along_a) * norm(along_b):
+        return -math.inf, n
+    n = scale(n, math.copysign(1.0 / length, dot(n, outwards)))
+    # Nearly parallel edges leave n uncertain across them, not along: only the part of b - a across may count.
+    apart = sub(b, a)
+    return dot(n, axpy(apart, along_a, -dot(apart, along_a) / dot(along_a, along_a))), n
 
 
 @kernel
-def _best_edge_pair(edges_a, vertices_a, normals_a, edges_b, vertices_b, normals_b):
-    """The deepest-lying crossing of edges: (separation, normal from a to b)."""
-    best, best_normal = -math.inf, (0.0, 0.0, 0.0)
+def _edge(edges, e, vertices, first_vertex):
+    """An end of edge ``e`` and the vector to its other end."""
+    start = load_vec3(vertices, edges[e, 0] - first_vertex)
+    return start, sub(load_vec3(vertices, edges[e, 1] - first_vertex), start)
+
+
+@kernel
+def _best_edge_pair(table, shape_a, shape_b, vertices_a, normals_a, vertices_b, normals_b):
+    """The deepest-lying crossing of edges of polyhedra: (separation, normal from a to b)."""
+    a, b, edges = table.shape[shape_a], table.shape[shape_b], table.edge
+    best, best_normal = -math.inf, _NOWHERE
     along_face_b = np.empty(len(normals_b))
-    for i in range(len(edges_a)):
-        a = load_vec3(vertices_a, edges_a[i, 0])
-        along_a = sub(load_vec3(vertices_a, edges_a[i, 1]), a)
-        left_a, right_a = load_vec3(normals_a, edges_a[i, 2]), load_vec3(normals_a, edges_a[i, 3])
+    for i in range(a.first_edge, a.last_edge):
+        start_a, along_a = _edge(edges, i, vertices_a, a.first_vertex)
+        left_a = load_vec3(normals_a, edges[i, 2] - a.first_face)
+        right_a = load_vec3(normals_a, edges[i, 3] - a.first_face)
         for f in range(len(normals_b)):
             along_face_b[f] = dot(load_vec3(normals_b, f), along_a)
-        for j in range(len(edges_b)):
-            left_b, right_b = along_face_b[edges_b[j, 2]], along_face_b[edges_b[j, 3]]
+        for j in range(b.first_edge, b.last_edge):
+            left_b, right_b = along_face_b[edges[j, 2] - b.first_face], along_face_b[edges[j, 3] - b.first_face]
             if left_b * right_b >= 0.0:
                 continue
-            b = load_vec3(vertices_b, edges_b[j, 0])
-            along_b = sub(load_vec3(vertices_b, edges_b[j, 1]), b)
+            start_b, along_b = _edge(edges, j, vertices_b, b.first_vertex)
             on_left, on_right = dot(left_a, along_b), dot(right_a, along_b)
             # The arc of a's normals crosses the mirrored arc of b's, on the same side of the sphere.
             if on_left * on_right >= 0.0 or left_b * on_right >= 0.0:
                 continue
-            n = cross(along_a, along_b)
-            length = norm(n)
-            if length <= _PARALLEL_EDGES * norm(along_a) * norm(along_b):
-                continue
             # Outwards from a: the sum of the edge's two face normals leans that way.
-            n = scale(n, math.copysign(1.0 / length, dot(n, add(left_a, right_a))))
-            # Nearly parallel edges leave n uncertain across them, not along: only the part of b - a across may count.
-            apart = sub(b, a)
-            separation = dot(n, axpy(apart, along_a, -dot(apart, along_a) / dot(along_a, along_a)))
+            separation, n = _edge_axis(start_a, along_a, add(left_a, right_a), start_b, along_b)
             if separation > best:
                 best, best_normal = separation, n
     return best, best_normal
 
 
 @kernel
-def hull_depth(table, shape_a, size_a, matrix_a, shape_b, size_b, matrix_b, offset):
-    """Separation along the best axis and that axis, from a to b in world axes.
+def _best_edge_of_segment(table, shape, vertices, normals, segment):
+    """The deepest-lying crossing of a polyhedron's edges and a segment (2, 3): (separation, normal to the segment)."""
+    record, edges = table.shape[shape], table.edge
+    start = load_vec3(segment, 0)
+    along = sub(load_vec3(segment, 1), start)
+    best, best_normal = -math.inf, _NOWHERE
+    for e in range(record.first_edge, record.last_edge):
+        left = load_vec3(normals, edges[e, 2] - record.first_face)
+        right = load_vec3(normals, edges[e, 3] - record.first_face)
+        # The arc of the edge's normals crosses the great circle of directions across the segment.
+        if dot(left, along) * dot(right, along) >= 0.0:
+            continue
+        start_a, along_a = _edge(edges, e, vertices, record.first_vertex)
+        separation, n = _edge_axis(start_a, along_a, add(left, right), start, along)
+        if separation > best:
+            best, best_normal = separation, n
+    return best, best_normal
 
-    Negative: the exact penetration depth (the shortest shift that parts them). Positive: a lower bound of the distance.
-    """
-    # All in the axes of a, about the centroid of a.
-    columns = (
-        mat_transposed_vec(matrix_a, (matrix_b[0], matrix_b[3], matrix_b[6])),
-        mat_transposed_vec(matrix_a, (matrix_b[1], matrix_b[4], matrix_b[7])),
-        mat_transposed_vec(matrix_a, (matrix_b[2], matrix_b[5], matrix_b[8])),
+
+@kernel
+def _polyhedron_depth(table, a, b, offset):
+    """As core_depth, for a polyhedron a and any core b."""
+    # All in the body axes of a, from the centroid of a.
+    turned_a = a[0], a[1], _IDENTITY
+    turned_b = b[0], b[1], _relative_rotation(a[2], b[2])
+    vertices_a, normals_a = _vertices_at(table, turned_a, _NOWHERE), _normals_at(table, turned_a)
+    vertices_b, normals_b = (
+        _vertices_at(table, turned_b, mat_transposed_vec(a[2], offset)),
+        _normals_at(table, turned_b),
     )
-    turn = (
-        columns[0][0], columns[1][0], columns[2][0],
-        columns[0][1], columns[1][1], columns[2][1],
-        columns[0][2], columns[1][2], columns[2][2],
-    )  # fmt: skip
-    identity = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    nowhere = (0.0, 0.0, 0.0)
-    local_offset = mat_transposed_vec(matrix_a, offset)
-    vs, fs = table.vertex_start, table.face_start
-    vertices_a = _into_frame(table.vertex, vs[shape_a], vs[shape_a + 1], identity, size_a, nowhere)
-    vertices_b = _into_frame(table.vertex, vs[shape_b], vs[shape_b + 1], turn, size_b, local_offset)
-    normals_a = table.face_normal[fs[shape_a] : fs[shape_a + 1]]
-    normals_b = _into_frame(table.face_normal, fs[shape_b], fs[shape_b + 1], turn, 1.0, nowhere)
-
-    separation, face = _best_face(normals_a, _one_corner_each(table, shape_a, vertices_a), vertices_b)
-    normal = load_vec3(normals_a, face)
-    of_b, face = _best_face(normals_b, _one_corner_each(table, shape_b, vertices_b), vertices_a)
+    separation, normal = _best_face(table, a[0], vertices_a, normals_a, vertices_b)
+    of_b, normal_b = _best_face(table, b[0], vertices_b, normals_b, vertices_a)
     if of_b > separation:
-        separation, normal = of_b, scale(load_vec3(normals_b, face), -1.0)
-    edges_a = table.edge[table.edge_start[shape_a] : table.edge_start[shape_a + 1]]
-    edges_b = table.edge[table.edge_start[shape_b] : table.edge_start[shape_b + 1]]
-    of_edges, edge_normal = _best_edge_pair(edges_a, vertices_a, normals_a, edges_b, vertices_b, normals_b)
-    sizes = table.radius[shape_a] * size_a + table.radius[shape_b] * size_b
-    if of_edges > separation + _FACE_FIRST * sizes:
+        separation, normal = of_b, scale(normal_b, -1.0)
+    of_edges, edge_normal = -math.inf, normal
+    if len(vertices_b) == 2:
+        of_edges, edge_normal = _best_edge_of_segment(table, a[0], vertices_a, normals_a, vertices_b)
+    else:
+        of_edges, edge_normal = _best_edge_pair(table, a[0], b[0], vertices_a, normals_a, vertices_b, normals_b)
+    if of_edges > separation + FACE_FIRST * (bounding_radius(table, a) + bounding_radius(table, b)):
         separation, normal = of_edges, edge_normal
-    return separation, mat_vec(matrix_a, normal)
+    return separation, mat_vec(a[2], normal)
+
+
+@kernel
+def _direction_of(table, body):
+    """The vector along a turned segment; of a point, nothing."""
+    record = table.shape[body[0]]
+    start, end = record.first_vertex, record.last_vertex - 1
+    return sub(vertex_position(table, body, end), vertex_position(table, body, start))
+
+
+@kernel
+def _across(v):
+    """A vector across ``v``, +x if that is nothing: the axis that v is least along, and v, span a plane; across it."""
+    x, y, z = abs(v[0]), abs(v[1]), abs(v[2])
+    if x + y + z == 0.0:
+        return 1.0, 0.0, 0.0
+    if x <= y and x <= z:
+        return 0.0, v[2], -v[1]
+    return (-v[2], 0.0, v[0]) if y <= z else (v[1], -v[0], 0.0)
+
+
+@kernel
+def _thin_depth(table, a, b, offset):
+    """As core_depth, for points and segments that touch: along any direction across both they are as good as apart."""
+    u, v = _direction_of(table, a), _direction_of(table, b)
+    longer = u if dot(u, u) >= dot(v, v) else v
+    n = cross(u, v)
+    if norm(n) <= PARALLEL_EDGES * norm(u) * norm(v):
+        n = _across(longer)
+    else:
+        # Of nearly parallel segments n is uncertain: across the longer it is across both.
+        n = axpy(n, longer, -dot(n, longer) / dot(longer, longer))
+    n = scale(n, 1.0 / norm(n))
+    separation = dot(n, offset)
+    return abs(separation), scale(n, -1.0 if separation < 0.0 else 1.0)
+
+
+@kernel
+def core_depth(table, a, b, offset):
+    """Separation of two cores along the best axis, and that axis, from a to b in world axes.
+
+    ``a`` and ``b`` are turned shapes (see geometry/support.py), b at ``offset`` from a.
+    Negative: the exact penetration depth, the shortest shift that parts the cores. Positive: a lower bound of the
+    distance.
+    """
+    if has_faces(table, a[0]):
+        return _polyhedron_depth(table, a, b, offset)
+    if has_faces(table, b[0]):
+        separation, normal = _polyhedron_depth(table, b, a, scale(offset, -1.0))
+        return separation, scale(normal, -1.0)
+    return _thin_depth(table, a, b, offset)

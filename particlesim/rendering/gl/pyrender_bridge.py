@@ -35,7 +35,7 @@ from pyrender.shader_program import ShaderProgram  # noqa: E402
 _SHADERS = Path(__file__).with_name("shaders")
 _FLOAT = 4  # bytes
 # Binding points, as the shaders have them: texture units, and that of the uniform block.
-_SHADOW_MAP, _FIRST_ROW, _SURFACES, _GROUND = gl.GL_TEXTURE0, gl.GL_TEXTURE1, gl.GL_TEXTURE2, gl.GL_TEXTURE3
+_SHADOW_MAP, _PIXEL, _SURFACES, _FLOOR = gl.GL_TEXTURE0, gl.GL_TEXTURE1, gl.GL_TEXTURE2, gl.GL_TEXTURE3
 _VIEW_BLOCK = 0  # binding point of the uniform block shared by all
 
 
@@ -50,10 +50,9 @@ class Kind:
     blend: bool = False  # lets through what is behind it, and hides nothing
 
 
-# Tiles of the picture, in which the canvas shades the spheres, or the hulls, that were found at its pixels. As points:
-# of two triangles each, what is beside the line between them would be shaded twice.
-SPHERES = Kind("tile", "sphere", (2,), gl.GL_POINTS)
-HULLS = Kind("tile", "face", (2,), gl.GL_POINTS)
+# Tiles of the picture, in which the canvas shades the surfaces of each kind that were found at its pixels (see
+# geometry_tables.py). As points: of two triangles each, what is beside the line between them would be shaded twice.
+SURFACES = tuple(Kind("tile", shader, (2,), gl.GL_POINTS) for shader in ("sphere", "face", "rounded"))
 FLOOR = Kind("floor", "floor")
 LINE = Kind("line", "line", (4, 3, 4), blend=True)
 
@@ -129,16 +128,16 @@ class Picture:
     """What a picture is made of besides the layers. The first rows of all maps are the lowest.
 
     ``view_block``: the uniform block of shaders/common.glsl; ``shadow`` (h, w) float32: the shadow map, how close to
-    the light what it meets is [m]; ``first_row`` (height, width) int32 and ``surfaces`` (rows, 4) float32: what is
-    seen at each pixel, see shaders/surface.glsl; ``ground`` (b, a) float32: share of the sky's light that reaches the
-    floor, from its corner (-x, -y) to (x, y).
+    the light what it meets is [m]; ``pixel`` (height, width) int32 and ``surfaces`` (rows, 4) float32: what is seen
+    at each pixel, see shaders/surface.glsl; ``floor`` (b, a) float32: share of the light that reaches the floor, from
+    its corner (-x, -y) to (x, y).
     """
 
     view_block: np.ndarray
     shadow: np.ndarray
-    first_row: np.ndarray
+    pixel: np.ndarray
     surfaces: np.ndarray
-    ground: np.ndarray
+    floor: np.ndarray
 
 
 class _Renderer(pyrender.Renderer):
@@ -154,8 +153,8 @@ class _Renderer(pyrender.Renderer):
         self._final = self._drawn if samples == 1 else _Target(*size, depth=False)
         self._surfaces = int(gl.glGenTextures(1))
         # Beyond the edges of the shadow map light meets nothing, beyond those of the floor nothing shades.
-        self._shadow, self._ground = _texture(gl.GL_NEAREST, -np.inf), _texture(gl.GL_LINEAR, 1.0)
-        self._first_row = _texture(gl.GL_NEAREST, -1.0)
+        self._shadow, self._floor = _texture(gl.GL_NEAREST, -np.inf), _texture(gl.GL_LINEAR, 1.0)
+        self._pixel = _texture(gl.GL_NEAREST, -1.0)
         gl.glBindBuffer(gl.GL_TEXTURE_BUFFER, self._table)
         gl.glBindTexture(gl.GL_TEXTURE_BUFFER, self._surfaces)
         gl.glTexBuffer(gl.GL_TEXTURE_BUFFER, gl.GL_RGBA32F, self._table)
@@ -189,8 +188,8 @@ class _Renderer(pyrender.Renderer):
         gl.glBlendFunc(gl.GL_SRC_ALPHA, gl.GL_ONE_MINUS_SRC_ALPHA)
         self._bind_surfaces()
         _fill(_SHADOW_MAP, self._shadow, gl.GL_R32F, gl.GL_RED, gl.GL_FLOAT, picture.shadow)
-        _fill(_FIRST_ROW, self._first_row, gl.GL_R32I, gl.GL_RED_INTEGER, gl.GL_INT, picture.first_row)
-        _fill(_GROUND, self._ground, gl.GL_R32F, gl.GL_RED, gl.GL_FLOAT, picture.ground)
+        _fill(_PIXEL, self._pixel, gl.GL_R32I, gl.GL_RED_INTEGER, gl.GL_INT, picture.pixel)
+        _fill(_FLOOR, self._floor, gl.GL_R32F, gl.GL_RED, gl.GL_FLOAT, picture.floor)
         self._draw_layers(scene)
         return self._read_main_framebuffer(scene, flags)
 

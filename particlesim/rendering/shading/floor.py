@@ -1,4 +1,4 @@
-"""The soft shade that particles close above the floor leave on it, where they hide the sky."""
+"""Ambient occlusion of the floor: the soft shade of bodies close above it."""
 
 from __future__ import annotations
 
@@ -6,49 +6,64 @@ import math
 
 import numpy as np
 
-from particlesim.core.jit import kernel
-from particlesim.rendering.visibility.instances import EVERYONE
+from particlesim.core.jit import entry_kernel
+from particlesim.rendering.visibility.instances import ALL_BODIES
 
-# The shade is told at points a particle's radius apart, and at most at so many along the floor's longer side.
+# The shade is sampled at points a body's radius apart, and at most at so many along the floor's longer side.
 _POINTS = 192
 
-# Particles whose middle is at most so many of their radii above the floor are looked at. Over the last of these radii
-# their shade fades to nothing: it would blink as they fall.
+# Bodies whose centroid is at most so many of their radii above the floor shade it. Over the last of these radii their
+# shade fades to nothing: it would blink as they fall.
 _HIGHEST = 3.0
 
 # Farther than so many heights, a sphere hides less than a fiftieth of what it hides below itself.
 _REACH = 3.6
 
-# The light of the sky at the floor, as a share of all its light.
-_SKY = 0.4
+# The ambient light at the floor, as a share of all its light.
+_AMBIENT = 0.4
 
 
-class Ground:
-    """A floor, ``half`` (2,) [m] wide to each side of the origin, at ``height`` [m]; radii (n,) of what is above it."""
+class FloorOcclusion:
+    """A floor about the origin.
 
-    def __init__(self, half: np.ndarray, height: float, inner: np.ndarray, outer: np.ndarray) -> None:
+    Parameters
+    ----------
+    half : (2,) float64
+        Half its width along x and y [m].
+    height : float
+        Its z [m].
+    inradius, radius : (n,) float64
+        Radii of the spheres within and about the bodies above it [m].
+    """
+
+    def __init__(self, half: np.ndarray, height: float, inradius: np.ndarray, radius: np.ndarray) -> None:
         self._half = np.asarray(half, dtype=np.float64)
         self._height = height
-        # A hull hides about as much as a sphere between those within and about it.
-        self._radius = 0.5 * (inner + outer)
-        typical = float(np.median(self._radius)) if len(inner) else 0.0
+        # A body hides about as much as a sphere between those within and about it.
+        self._radius = 0.5 * (inradius + radius)
+        typical = float(np.median(self._radius)) if len(radius) else 0.0
         self._step = max(2.0 * float(max(self._half)) / _POINTS, typical)
 
-    def light(self, position: np.ndarray, whose: slice | np.ndarray = EVERYONE) -> np.ndarray:
+    def light(self, position: np.ndarray, source: slice | np.ndarray = ALL_BODIES) -> np.ndarray:
         """Share of the light that reaches the floor, (b, a) float32, from its corner (-x, -y) to (x, y).
 
-        ``whose`` (m,) particle each of those at ``position`` (m, 3) is an image of (see cast.py).
+        Parameters
+        ----------
+        position : (m, 3) float64
+            Centroids of all instances [m].
+        source : slice or (m,) int64
+            The body that each is an image of (see instances.py).
         """
         width, depth = (max(1, round(2.0 * half / self._step)) for half in self._half)
         light = np.ones((depth, width))
         corner = np.array([*-self._half, self._height])
-        _shade(np.ascontiguousarray(position), self._radius[whose], corner, 2.0 * self._half, light)
-        return (1.0 - _SKY * (1.0 - light)).astype(np.float32)
+        _shade(np.ascontiguousarray(position), self._radius[source], corner, 2.0 * self._half, light)
+        return (1.0 - _AMBIENT * (1.0 - light)).astype(np.float32)
 
 
-@kernel
+@entry_kernel
 def _shade(position, radius, corner, size, light):
-    """Take away what each sphere close above the floor hides of an even sky.
+    """Take away what each sphere close above the floor hides of an even light from above.
 
     At a distance d from the point below a sphere of radius r at height h that is (r / h)^2 / (1 + (d / h)^2)^(3/2) of
     its light (plane element to sphere; J. R. Howell, A Catalog of Radiation Heat Transfer Configuration Factors).

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from particlesim.core.jit import kernel
+from particlesim.core.jit import entry_kernel, kernel
 from particlesim.core.parallel import ThreadTeam
 
 # Steps of brightness (0 .. 255) below both of these are no edges: the least, and the share of the brightest about.
@@ -38,7 +38,7 @@ def fxaa(image: np.ndarray) -> np.ndarray:
     return smooth
 
 
-@kernel
+@entry_kernel
 def _brightness(image, bright, smooth, first, last):
     """Copy the colours, and work out brightness as the eye has it: green most, blue least (ITU-R BT.601)."""
     height, width = image.shape[0], image.shape[1]
@@ -70,7 +70,7 @@ def _contrast(bright, row, contrast):
         contrast[column] = most - min(here, n, s, e, w) - max(_DIM, _STEEP * most)
 
 
-@kernel
+@entry_kernel
 def _smooth(image, bright, smooth, first, last):
     height, width = image.shape[0], image.shape[1]
     contrast = np.empty(width, dtype=np.float32)

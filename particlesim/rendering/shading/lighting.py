@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.rendering.camera import light_azimuth
-from particlesim.rendering.visibility.projection import Outlook
+from particlesim.rendering.visibility.projection import Projection
 from particlesim.scene import Scene
 
 # Height of the key light above the horizon [degrees]: shadows stay short and under their particles.
@@ -32,9 +32,9 @@ class Light(NamedTuple):
     pixels: tuple[int, int]
 
     @property
-    def outlook(self) -> Outlook:
+    def projection(self) -> Projection:
         """The projection of the shadow map."""
-        return Outlook(self.axes, np.zeros(3), True, self.pixels[0] / (2.0 * self.reach[0]), self.pixels)
+        return Projection(self.axes, np.zeros(3), True, self.pixels[0] / (2.0 * self.reach[0]), self.pixels)
 
     def matrix(self, eye: np.ndarray) -> np.ndarray:
         """From places seen from ``eye`` to coordinates in the shadow map, 0 .. 1, and closeness to the light [m].

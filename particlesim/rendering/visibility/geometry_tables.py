@@ -1,4 +1,4 @@
-"""What the particles of a movie look like, as the kernels that look for them want it."""
+"""The bodies of a movie and their shapes as tables for the rasteriser."""
 
 from __future__ import annotations
 
@@ -6,47 +6,49 @@ from typing import NamedTuple
 
 import numpy as np
 
+from particlesim.core.jit import kernel
+from particlesim.core.records import record
+from particlesim.geometry.shape_table import ShapeTable, stack_shapes
 from particlesim.trajectory.frames import Header
 
+# A body: number of its shape, and the factor on that of size 1 [m].
+BODY = record([("shape", "i8"), ("size", "f8")])
 
-class Bodies(NamedTuple):
-    """``inner`` and ``outer`` (n,) radii of spheres within and about each particle [m], the same for spheres alone;
-    ``size`` (n,) [m]; ``shape`` (n,) int64.
+# How a shape is drawn, in the order of the shaders' layers: a ball is one sphere; of a faceted one each pixel sees one
+# face; of a rounded shape one offset face, the cylinder about one edge, or the sphere about one vertex.
+BALL, FACETED, ROUNDED = range(3)
 
-    Of the shape s of size 1, rows ``first_plane[s]`` to ``first_plane[s + 1]`` of ``planes`` (p, 4) float64 are its
-    faces: outward normal and distance from the middle; ``corners`` (p,) int64, how many each has. Rows
-    ``first_edge[s]`` to ``first_edge[s + 1]`` of ``edges`` (e, 2) int64 are its edges: the two faces, 0 the first of
-    the shape. A sphere has neither.
+
+class GeometryTables(NamedTuple):
+    """The bodies of a trajectory.
+
+    Parameters
+    ----------
+    shapes : ShapeTable
+        Their shapes of size 1.
+    body : (n,) BODY
+        Which shape each body has, and its size.
+    radius, inradius : (n,) float64
+        Radii of the spheres about and within each body [m].
     """
 
-    inner: np.ndarray
-    outer: np.ndarray
-    size: np.ndarray
-    shape: np.ndarray
-    first_plane: np.ndarray
-    planes: np.ndarray
-    corners: np.ndarray
-    first_edge: np.ndarray
-    edges: np.ndarray
+    shapes: ShapeTable
+    body: np.ndarray
+    radius: np.ndarray
+    inradius: np.ndarray
 
 
-def bodies_of(header: Header) -> Bodies:
-    """The particles of a trajectory."""
-    shapes, shape = header.shapes, header.shape
-    planes = [
-        (*normal, normal @ hull.vertices[loop[0]])
-        for hull in shapes
-        for normal, loop in zip(hull.face_normals, hull.faces, strict=True)
-    ]
-    edges = [(left, right) for hull in shapes for _, _, left, right in hull.edges]
-    return Bodies(
-        inner=np.array([hull.inradius for hull in shapes])[shape] * header.size,
-        outer=header.radius,
-        size=np.ascontiguousarray(header.size, dtype=np.float64),
-        shape=np.ascontiguousarray(shape, dtype=np.int64),
-        first_plane=np.cumsum([0, *(len(hull.faces) for hull in shapes)]),
-        planes=np.array(planes, dtype=np.float64).reshape(-1, 4),
-        corners=np.array([len(loop) for hull in shapes for loop in hull.faces], dtype=np.int64),
-        first_edge=np.cumsum([0, *(len(hull.edges) for hull in shapes)]),
-        edges=np.array(edges, dtype=np.int64).reshape(-1, 2),
-    )
+def geometry_tables(header: Header) -> GeometryTables:
+    """The bodies of a trajectory."""
+    body = np.empty(len(header.size), dtype=BODY)
+    body["shape"], body["size"] = header.shape, header.size
+    inradius = np.array([shape.inradius for shape in header.shapes])[header.shape] * header.size
+    return GeometryTables(stack_shapes(header.shapes), body, header.radius, inradius)
+
+
+@kernel
+def drawn_as(shape):
+    """Whether a SHAPE row is drawn as a BALL, a FACETED or as ROUNDED."""
+    if shape.first_edge == shape.last_edge:
+        return BALL
+    return ROUNDED if shape.rounding > 0.0 else FACETED

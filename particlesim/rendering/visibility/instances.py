@@ -1,4 +1,4 @@
-"""Who is in a picture: all particles, and in a periodic world those that come in where others stick out."""
+"""What a picture shows: every body, and in a periodic world the images of those that reach through its faces."""
 
 from __future__ import annotations
 
@@ -7,55 +7,79 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.rendering.visibility.geometry_tables import Bodies
+from particlesim.rendering.visibility.geometry_tables import GeometryTables
 from particlesim.scene import Scene
 from particlesim.trajectory.frame_aabb import frame_boxes
 from particlesim.trajectory.frames import Frame, Header
 
-# Each particle as itself.
-EVERYONE = slice(None)
+# The source of instances that are the bodies themselves, one each.
+ALL_BODIES = slice(None)
 
 
-class Cast(NamedTuple):
-    """``position`` (m, 3) and ``orientation`` (m, 4) float64 of all that may be seen, what they look like, and
-    ``whose`` (m,) image each is: EVERYONE, or numbers of particles.
+class Instances(NamedTuple):
+    """What may be seen in a picture.
+
+    Parameters
+    ----------
+    position : (m, 3) float64
+        Centroids [m].
+    orientation : (m, 4) float64
+        Unit quaternions (w, x, y, z).
+    tables : GeometryTables
+        Shape and size of each instance.
+    source : slice or (m,) int64
+        The body that each is an image of: ALL_BODIES, or their numbers.
     """
 
     position: np.ndarray
     orientation: np.ndarray
-    bodies: Bodies
-    whose: slice | np.ndarray
+    tables: GeometryTables
+    source: slice | np.ndarray = ALL_BODIES
 
-    def particles(self, members: np.ndarray) -> np.ndarray:
-        """Which particles ``members`` (k,) of the cast are images of, (k,)."""
-        return members if isinstance(self.whose, slice) else self.whose[members]
+    def bodies(self, indices: np.ndarray) -> np.ndarray:
+        """The bodies (k,) that the instances ``indices`` (k,) are images of."""
+        return indices if isinstance(self.source, slice) else self.source[indices]
 
 
-def cast_of(scene: Scene, header: Header, frame: Frame, bodies: Bodies) -> Cast:
-    """The particles of a frame, and their images through the faces of a periodic world that they reach through."""
+def instances_of(scene: Scene, header: Header, frame: Frame, tables: GeometryTables) -> Instances:
+    """The bodies of a frame, and their images through the faces of a periodic world that they reach through."""
     position, orientation = np.ascontiguousarray(frame.position), np.ascontiguousarray(frame.orientation)
     periodic = np.array(scene.world.boundary) == "periodic"
     if not periodic.any():
-        return Cast(position, orientation, bodies, EVERYONE)
+        return Instances(position, orientation, tables)
     size = np.asarray(scene.world.size)
-    near = np.flatnonzero(((np.abs(position) + bodies.outer[:, None] > 0.5 * size) & periodic).any(axis=1))
+    near = np.flatnonzero(((np.abs(position) + tables.radius[:, None] > 0.5 * size) & periodic).any(axis=1))
     boxes = frame_boxes(
         replace(header, shape=header.shape[near], size=header.size[near]),
         replace(frame, position=position[near], orientation=orientation[near]),
     )
     which, shift = images_of(*boxes, size, periodic)
-    whose = np.concatenate([np.arange(len(position)), near[which]])
-    of_each = {name: getattr(bodies, name)[whose] for name in ("inner", "outer", "size", "shape")}
+    source = np.concatenate([np.arange(len(position)), near[which]])
+    of_each = {name: getattr(tables, name)[source] for name in ("body", "radius", "inradius")}
     images = position[near[which]] + shift
-    return Cast(np.concatenate([position, images]), orientation[whose], bodies._replace(**of_each), whose)
+    return Instances(np.concatenate([position, images]), orientation[source], tables._replace(**of_each), source)
 
 
 def images_of(
     lower: np.ndarray, upper: np.ndarray, size: np.ndarray, periodic: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Images of boxes that reach through a face of a world about the origin: ``which`` (k,) box, and its shift (k, 3).
+    """Images of AABBs that reach through a face of a world about the origin.
 
-    ``lower`` and ``upper`` (n, 3), edges of the world ``size`` (3,) [m] and which axes are ``periodic`` (3,) bool.
+    Parameters
+    ----------
+    lower, upper : (n, 3) float64
+        Corners of the AABBs [m].
+    size : (3,) float64
+        Edges of the world [m].
+    periodic : (3,) bool
+        Which axes are periodic.
+
+    Returns
+    -------
+    which : (k,) int64
+        The AABB that each image is of.
+    shift : (k, 3) float64
+        From the AABB to its image [m].
     """
     count = len(lower)
     which, shift = np.arange(count), np.zeros((count, 3))
@@ -64,7 +88,7 @@ def images_of(
         below = np.flatnonzero(lower[which, axis] < -0.5 * size[axis])
         above = np.flatnonzero(upper[which, axis] > 0.5 * size[axis])
         through = np.concatenate([below, above])
-        turn = shift[through]
-        turn[:, axis] = np.repeat([size[axis], -size[axis]], [len(below), len(above)])
-        which, shift = np.concatenate([which, which[through]]), np.concatenate([shift, turn])
+        moved = shift[through]
+        moved[:, axis] = np.repeat([size[axis], -size[axis]], [len(below), len(above)])
+        which, shift = np.concatenate([which, which[through]]), np.concatenate([shift, moved])
     return which[count:], shift[count:]

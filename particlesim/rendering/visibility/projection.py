@@ -1,4 +1,4 @@
-"""Where particles are for one who looks at them, be it the camera or the light."""
+"""Projections: how the camera, or the key light, maps the world to pixels."""
 
 from __future__ import annotations
 
@@ -7,12 +7,23 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Outlook(NamedTuple):
-    """A picture, or the shadow map, as squares of which each shows what is nearest at its middle.
+class Projection(NamedTuple):
+    """A picture, or the shadow map, as square pixels, each of which shows what is nearest at its middle.
 
-    ``axes`` (3, 3): rows right, up and away of the one who looks; ``eye`` (3,) [m], where that is, or any place if
-    the view is ``parallel``; ``scale``: squares a metre, at distance 1 m if the view is not parallel; ``size``:
-    squares across and down, ``eye`` being in their middle.
+    View coordinates are x to the right, y up and z away from the eye.
+
+    Parameters
+    ----------
+    axes : (3, 3) float64
+        Unit vectors right, up and away, row by row, in world axes.
+    eye : (3,) float64
+        Where the projection starts [m]; any point of the central ray if it is ``parallel``.
+    parallel : bool
+        Whether all rays run along the third axis, as those of the light do.
+    scale : float
+        Pixels per metre, at distance 1 m if the projection is not parallel.
+    size : (int, int)
+        Pixels across and down; ``eye`` projects to their middle.
     """
 
     axes: np.ndarray
@@ -21,10 +32,34 @@ class Outlook(NamedTuple):
     scale: float
     size: tuple[int, int]
 
+    def strip(self, first: int, last: int) -> Strip:
+        """Columns ``first`` to ``last`` of the picture, for the kernels."""
+        width, height = self.size
+        axes, eye = np.ascontiguousarray(self.axes), np.ascontiguousarray(self.eye)
+        return Strip(axes, eye, self.parallel, self.scale, 0.5 * width, 0.5 * height, height, first, last)
 
-def nearest_first(away: np.ndarray) -> np.ndarray:
-    """The order of what is so far ``away``, (k,), int64: roughly the nearer first."""
-    low, high = (away.min(), away.max()) if len(away) else (0.0, 0.0)
-    # Distances in so many steps are sorted in a time that grows with their number only.
-    steps = (away - low) * (65535.0 / (high - low) if high > low else 0.0)
+
+class Strip(NamedTuple):
+    """Some columns of a picture, which one thread fills; see Projection.
+
+    The middle of pixel (row, column) is at x = (column + 0.5 - middle_x) / scale, y = (row + 0.5 - middle_y) / scale
+    in view coordinates [m], at z = 1 m if the projection is not parallel.
+    """
+
+    axes: np.ndarray
+    eye: np.ndarray
+    parallel: bool
+    scale: float
+    middle_x: float
+    middle_y: float
+    height: int
+    first: int
+    last: int
+
+
+def depth_order(depth: np.ndarray) -> np.ndarray:
+    """Indices (k,) int64 that sort ``depth`` (k,) [m], roughly: the nearer first."""
+    low, high = (depth.min(), depth.max()) if len(depth) else (0.0, 0.0)
+    # In 16 bits they are sorted by radix, in a time that grows with their number only.
+    steps = (depth - low) * (65535.0 / (high - low) if high > low else 0.0)
     return np.argsort(steps.astype(np.uint16), kind="stable")

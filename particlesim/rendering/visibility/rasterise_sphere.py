@@ -1,4 +1,4 @@
-"""Spheres, and discs, at the pixels of a picture: where they are the nearest so far (see visibility.py)."""
+"""Spheres, and discs, at the pixels of a picture where they are the nearest so far (see rasterise.py)."""
 
 from __future__ import annotations
 
@@ -7,45 +7,38 @@ import math
 import numpy as np
 
 from particlesim.core.jit import kernel
+from particlesim.rendering.visibility.screen_bounds import integer_range, pixel_range
 
 
 @kernel
-def span(low, high, middle, scale, first, last):
-    """The pixels of ``first .. last`` whose middles lie between two lines [m at distance 1]: first, past last."""
-    return pixels(middle + scale * low - 0.5, middle + scale * high - 0.5, first, last)
-
-
-@kernel
-def pixels(start, end, first, last):
-    """The whole numbers of ``first .. last`` from ``start`` to ``end``: first, past last."""
-    # Compared as numbers first: a line may be farther away than an integer can say.
-    start = first if start <= first else (last if start >= last else math.ceil(start))
-    end = first if end < first else (last if end >= last - 1 else math.floor(end) + 1)
-    return int(start), int(end)
-
-
-@kernel
-def trace_disc(x, y, z, radius, window, close):
-    """A disc that faces a parallel view."""
-    middle_x, middle_y, scale, first, last = window
-    low, high = span(y - radius, y + radius, middle_y, scale, 0, len(close))
+def rasterise_disc(centre, radius, strip, inverse_depth):
+    """A disc that faces a parallel projection."""
+    x, y, z = centre
+    scale, middle_x, middle_y = strip.scale, strip.middle_x, strip.middle_y
+    low, high = pixel_range(y - radius, y + radius, middle_y, scale, 0, len(inverse_depth))
     for row in range(low, high):
         aside = (row + 0.5 - middle_y) / scale - y
         half = math.sqrt(max(radius * radius - aside * aside, 0.0))
-        start, end = span(x - half, x + half, middle_x, scale, first, last)
+        start, end = pixel_range(x - half, x + half, middle_x, scale, strip.first, strip.last)
         for column in range(start, end):
-            close[row, column] = max(close[row, column], -z)
+            inverse_depth[row, column] = max(inverse_depth[row, column], -z)
 
 
 @kernel
-def trace_sphere(i, x, y, z, radius, window, close, owner):
-    """A sphere before the eye: where the ray (u, v, 1) t meets it first, t^2 (d.d) - 2 t (d.c) + c.c - r^2 = 0."""
-    middle_x, middle_y, scale, first, last = window
+def rasterise_sphere(i, primitive, centre, radius, strip, buffer):
+    """A sphere before the eye: where the ray (u, v, 1) t meets it first, t^2 (d.d) - 2 t (d.c) + c.c - r^2 = 0.
+
+    ``primitive`` is its number in a rounded shape, None for a body that is one sphere: compiled apart, since to write
+    it takes time.
+    """
+    x, y, z = centre
+    scale, middle_x, middle_y = strip.scale, strip.middle_x, strip.middle_y
     power = x * x + y * y + z * z - radius * radius
     # The rows between the two planes through the eye that touch it, and in a row the columns between two rays that do.
     reach = radius * math.sqrt(y * y + z * z - radius * radius)
     across = z * z - radius * radius
-    low, high = span((y * z - reach) / across, (y * z + reach) / across, middle_y, scale, 0, len(close))
+    height, width = buffer.inverse_depth.shape
+    low, high = pixel_range((y * z - reach) / across, (y * z + reach) / across, middle_y, scale, 0, height)
     across = power - x * x
     pixel, per_power, per_across = 1.0 / scale, 1.0 / power, 1.0 / across
     bend = np.float32(math.sqrt(across) * pixel * per_power)
@@ -58,34 +51,38 @@ def trace_sphere(i, x, y, z, radius, window, close, owner):
         right = middle_x + scale * (x * w + half) * per_across - 0.5
         # In single precision, by which from these two columns on no digits are lost. The first of the whole row counts,
         # or the number of strips would be seen.
-        start, end = pixels(left, right, 0, close.shape[1])
+        start, end = integer_range(left, right, 0, width)
         there = np.float32((w + (start + 0.5 - middle_x) * pixel * x) * per_power)
         before, beyond = np.float32(start - left), np.float32(right - start)
-        begin = max(start, first)
-        closest, owners = close[row, begin : min(end, last)], owner[row, begin : min(end, last)]
-        for k in range(len(closest)):
+        begin, end = max(start, strip.first), min(end, strip.last)
+        nearest, ids = buffer.inverse_depth[row, begin:end], buffer.id[row, begin:end]
+        for k in range(len(nearest)):
             t = np.float32(begin - start + k)
             q = there + slope * t + bend * math.sqrt(max((before + t) * (beyond - t), np.float32(0.0)))
-            nearer = closest[k] < q
-            closest[k] = q if nearer else closest[k]
-            owners[k] = i if nearer else owners[k]
+            nearer = nearest[k] < q
+            nearest[k] = q if nearer else nearest[k]
+            ids[k] = i if nearer else ids[k]
+            if primitive is not None and nearer:
+                buffer.primitive[row, begin + k] = primitive
 
 
 @kernel
-def trace_sphere_beside(i, x, y, z, radius, window, close, owner):
+def rasterise_near_sphere(i, primitive, centre, radius, strip, buffer):
     """A sphere that reaches beside the eye: any pixel may see it. None does from within."""
-    middle_x, middle_y, scale, first, last = window
+    x, y, z = centre
     power = x * x + y * y + z * z - radius * radius
     if power <= 0.0:
         return
-    for row in range(len(close)):
-        v = (row + 0.5 - middle_y) / scale
-        for column in range(first, last):
-            u = (column + 0.5 - middle_x) / scale
+    for row in range(len(buffer.inverse_depth)):
+        v = (row + 0.5 - strip.middle_y) / strip.scale
+        for column in range(strip.first, strip.last):
+            u = (column + 0.5 - strip.middle_x) / strip.scale
             b = u * x + v * y + z
             root = b * b - (1.0 + u * u + v * v) * power
             if b > 0.0 and root >= 0.0:
                 q = (b + math.sqrt(root)) / power
-                if close[row, column] < q:
-                    close[row, column] = q
-                    owner[row, column] = i
+                if buffer.inverse_depth[row, column] < q:
+                    buffer.inverse_depth[row, column] = q
+                    buffer.id[row, column] = i
+                    if primitive is not None:
+                        buffer.primitive[row, column] = primitive

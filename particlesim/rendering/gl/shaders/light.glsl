@@ -31,6 +31,17 @@ vec3 direct(vec3 colour, vec3 normal) {
     return colour * KEY * max(dot(normal, light.xyz), 0.0);
 }
 
+// The same of both from a glossy surface that is round, in linear light; ``ray`` is a unit vector from the eye to it.
+vec3 round_surface(vec4 paint, vec3 normal, vec3 ray, vec3 place) {
+    float facing = -dot(normal, ray);
+    float gloss = max(dot(normal, normalize(light.xyz - ray)), 0.0);
+    gloss *= gloss; gloss *= gloss; gloss *= gloss; gloss *= gloss; gloss *= gloss;
+    // Shadows end in ragged edges where light grazes; on a round body it is faded out there.
+    float grazing = smoothstep(0.0, 0.3, dot(normal, light.xyz));
+    vec3 key = direct(paint.rgb, normal) * grazing + 0.22 * gloss;
+    return paint.a * ambient(paint.rgb, normal, facing) + lit(place) * key;
+}
+
 // From linear light to the picture. The square root stands for the curve of sRGB at a tenth of its cost; colours
 // come in by the square, so that a colour in full light is the one that was asked for.
 vec3 encode(vec3 light) {

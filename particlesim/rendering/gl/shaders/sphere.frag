@@ -4,7 +4,7 @@
 out vec4 pixel;
 
 void main() {
-    int row = texelFetch(first_row, ivec2(gl_FragCoord.xy), 0).x;
+    int row = first_row(BALL);
     if (row < 0) discard;
     vec4 ball = texelFetch(surfaces, row);
     vec4 paint = texelFetch(surfaces, row + 1);
@@ -17,12 +17,6 @@ void main() {
     vec3 place = (along - half_chord) * ray;
     gl_FragDepth = depth_at(1.0 / dot(forward.xyz, place));
     vec3 normal = (place - ball.xyz) / ball.w;
-    float facing = -dot(normal, ray);
-    float gloss = max(dot(normal, normalize(light.xyz - ray)), 0.0);
-    gloss *= gloss; gloss *= gloss; gloss *= gloss; gloss *= gloss; gloss *= gloss;
-    // Shadows end in ragged edges where light grazes; on a round body it is faded out there.
-    float grazing = smoothstep(0.0, 0.3, dot(normal, light.xyz));
-    vec3 key = direct(paint.rgb, normal) * grazing + 0.22 * gloss;
-    vec3 colour = encode(paint.a * ambient(paint.rgb, normal, facing) + lit(place) * key);
+    vec3 colour = encode(round_surface(paint, normal, ray, place));
     pixel = vec4(mix(colour, background.rgb, haze_at(dot(forward.xyz, ball.xyz))), 1.0);
 }

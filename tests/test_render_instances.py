@@ -1,12 +1,12 @@
-"""Who is in a picture of a periodic world: those who reach through a face are there on its other side as well."""
+"""What a picture of a periodic world shows: what reaches through a face is there on its other side as well."""
 
 from itertools import product
 
 import numpy as np
 
 from particlesim.geometry import shapes
-from particlesim.rendering.visibility.geometry_tables import bodies_of
-from particlesim.rendering.visibility.instances import cast_of, images_of
+from particlesim.rendering.visibility.geometry_tables import geometry_tables
+from particlesim.rendering.visibility.instances import images_of, instances_of
 from tests.test_render_picture import covered, draw, edge, make_frame, make_header, make_scene, seen
 
 
@@ -54,12 +54,15 @@ def test_an_image_is_the_particle_s_in_shape_and_colour():
 
 
 def test_hulls_that_do_not_reach_through_a_face_have_no_image():
-    """A cube flat against a face, whose bounding sphere is through it; turned by half a right angle its edge is."""
+    """A cube flat against a face, whose bounding sphere is through it; turned by half a right angle its edge is.
+
+    So is its face where rounding moves it out.
+    """
     flat, turned = [1.0, 0.0, 0.0, 0.0], [np.cos(np.pi / 8), np.sin(np.pi / 8), 0.0, 0.0]
-    header = make_header([shapes.cube()], np.zeros(1, int), [1.0])
     world = make_scene("#000000", world={"boundary": "periodic"})
-    for turn, count in ((flat, 1), (turned, 2)):
+    for turn, rounding, count in ((flat, 0.0, 1), (turned, 0.0, 2), (flat, 0.09, 1), (flat, 0.11, 2)):
+        header = make_header([shapes.cube(rounding=rounding)], np.zeros(1, int), [1.0])
         frame = make_frame([(0.0, 2.4, 0.0)], [turn])
-        cast = cast_of(world, header, frame, bodies_of(header))
-        assert len(cast.position) == count
-        assert cast.particles(np.arange(count)).tolist() == [0] * count
+        instances = instances_of(world, header, frame, geometry_tables(header))
+        assert len(instances.position) == count
+        assert instances.bodies(np.arange(count)).tolist() == [0] * count

@@ -1,0 +1,80 @@
+"""Everything that the next substep depends on, by name: what is hashed, saved and gone on from."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from particlesim.core.records import record
+from particlesim.dynamics.neighbour_list import NeighbourList, Order
+
+# A pose that displacements are counted from.
+SEEN = record([("position", "f8", (3,)), ("orientation", "f8", (4,))])
+
+# The force of a contact point in the substep before: a number for the pair of bodies, the point's lever, and the force.
+FORCE = record([("contact", "i8"), ("lever", "f8", (3,)), ("force", "f8")])
+
+
+@dataclass
+class Counts:
+    """What was done since the start. It decides nothing."""
+
+    each: np.ndarray  # (n,) int64, impacts of each particle
+    impacts: int = 0
+    virial: float = 0.0  # sum of r_ij . impulse over pair impacts [J s]
+    wall_impulse: np.ndarray = field(default_factory=lambda: np.zeros(6))  # outward, on each wall [N s]
+    pairs_tested: int = 0  # boxes compared by the broad phase
+    candidate_pairs: int = 0  # pairs it found
+    unresolved: int = 0  # substeps in which more happened than was worked through (see MAX_IMPACTS)
+
+
+@dataclass
+class SolverState:
+    """What persists from substep to substep, but for the bodies themselves."""
+
+    time: float  # [s]
+    order: Order  # of the bodies along the space-filling curve
+    searches: int  # of neighbours so far
+    skin: np.ndarray  # (n,) of each bounded body [m]
+    time_within_skins: float  # for how long the neighbour list is certainly true [s]
+    neighbours: NeighbourList
+    standing: np.ndarray  # (n,) int64: FREE, SETTLES or LOOSE
+    seen: np.ndarray  # (n,) SEEN, (0,) where nothing comes to rest
+    displacement: np.ndarray  # (n,) how far surfaces have come [m], (0,) where nothing comes to rest
+    clearance: np.ndarray  # beside ``neighbours.other``: how far apart they were, plus displacements [m]
+    forces: np.ndarray  # (k,) FORCE
+    pressed_speed: float  # the largest of surfaces of what rests [m/s]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Everything by name; what is not an array as one of no dimensions."""
+        found: dict[str, np.ndarray] = {}
+        for name in (f.name for f in fields(self)):
+            value = getattr(self, name)
+            if isinstance(value, Order | NeighbourList):
+                found |= {f"{name}.{part}": array for part, array in value._asdict().items()}
+            else:
+                found[name] = np.asarray(value)
+        return found
+
+    @classmethod
+    def of_arrays(cls, arrays: dict[str, np.ndarray]) -> SolverState:
+        """The state that ``arrays`` gave."""
+        kinds: dict[str, Any] = {"order": Order, "neighbours": NeighbourList}
+        values: dict[str, Any] = {}
+        for name in (f.name for f in fields(cls)):
+            if name in kinds:
+                values[name] = kinds[name](**{part: arrays[f"{name}.{part}"] for part in kinds[name]._fields})
+            else:
+                values[name] = arrays[name].item() if arrays[name].ndim == 0 else arrays[name]
+        return cls(**values)
+
+
+def digest(*arrays: np.ndarray) -> str:
+    """SHA-256 of the bytes of arrays."""
+    total = hashlib.sha256()
+    for array in arrays:
+        total.update(np.ascontiguousarray(array).tobytes())
+    return total.hexdigest()

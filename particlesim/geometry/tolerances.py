@@ -1,0 +1,80 @@
+"""Every tolerance of the geometry: its unit, its reason, and what goes wrong if it is changed.
+
+"Size" is the extent of a shape, or the sum of the bounding radii of a pair; a fraction of it has no unit. Double
+precision rounds at 1e-16 of the numbers involved, and a sum of products of coordinates is off by a few times that.
+"""
+
+# --- Building shapes: vertices that a file or a user gave ------------------------------------------------------------
+
+# Fraction of the extent below which a difference of vertices is rounding: mesh files hold float32 or six digits. A
+# vertex that stands out by less is dropped; triangles within it of the plane of a larger neighbour are one face.
+# Larger: real edges of meshes vanish. Smaller: a flat side of a mesh file becomes hundreds of faces.
+VERTEX_ROUNDING = 1e-6
+
+# Angle [rad] between normals above which triangles are two faces, however thin the shape (a needle is thinner than
+# VERTEX_ROUNDING). Larger: the sides of thin plates merge. Smaller: slivers, whose normals are uncertain, stay apart.
+SAME_FACE_ANGLE = 0.1
+
+# Fraction of the extent by which corners may lie off the plane of their face when the faces have been made plane.
+# Larger: the manifold of faces on faces is off by it. Smaller: rounding is never below it, and the shape is refused.
+FLAT_FACE = 1e-14
+
+# Fraction of the largest moment below which products of inertia are rounding: the axes are principal already, and a
+# cube keeps the axes it was described in. Smaller: shapes with equal moments turn into arbitrary axes.
+PRINCIPAL_AXES = 1e-12
+
+# The most corners of a mesh; one of more is thinned. The separating-axis test looks at every pair of edges: twice as
+# many corners take four times as long where bodies overlap. Buffers of the contact manifold have this size, too.
+MAX_MESH_VERTICES = 96
+
+# --- GJK: distance of cores that are apart ---------------------------------------------------------------------------
+
+# Fraction of the distance by which a vertex of the difference body may be nearer than the simplex when the search
+# ends. Larger: distances lose digits, and impacts are placed wrongly. Smaller: rounding never gets there.
+GJK_GAP = 1e-15
+
+# The most steps of a search. Every step shortens the distance or turns the direction; hulls of MAX_MESH_VERTICES take
+# some 30 steps. Fewer: round hulls are cut short and count as touching.
+GJK_MAX_STEPS = 256
+
+# The most steps that turn the direction without shortening the distance; more go round in circles.
+GJK_MAX_IDLE = 8
+
+# Uncertainty of a distance as a fraction of its own length: some units in the last place. Smaller: proven distances
+# are thrown away as unproven.
+GJK_ROUNDING = 1e-14
+
+# Fraction of the sizes below which the yes-or-no test says that cores touch. Smaller: it may contradict the
+# separation where that is rounding. Larger: near misses count as contacts.
+TOUCHING = 1e-10
+
+# Fraction of the sizes below which the distance of cores is rounding: the separating-axis test takes over. Larger:
+# the separation jumps there. Smaller: GJK's direction is noise.
+JOINED = 1e-13
+
+# --- Separating axes: depth of cores that overlap --------------------------------------------------------------------
+
+# Sine of the angle below which two edges give no direction worth having: a face normal is as good. Larger: depths of
+# nearly parallel edges are missed. Smaller: directions made of rounding.
+PARALLEL_EDGES = 1e-10
+
+# Fraction of the sizes by which an edge pair must beat the best face: ties go to faces, whose contact is a patch.
+# Smaller: stacked boxes touch at a point. Larger: depths are off by it.
+FACE_FIRST = 1e-14
+
+# --- Sphere against polyhedron ---------------------------------------------------------------------------------------
+
+# Fraction of the size within which a centre counts as on an edge or vertex: the normal is that of a face there, as
+# the direction from the nearest point is mostly rounding. Larger: normals jump at edges.
+ON_SURFACE = 1e-10
+
+# --- Contact manifolds -----------------------------------------------------------------------------------------------
+
+# Sine of the angle below which two faces, edges, or an edge and a face touch along a patch, not at a point. Points of
+# the patch are off by at most its product with the size; rounding turns a face by about 1e-15. Smaller: boxes put on
+# each other tip. Larger: points lie off the bodies. Resting contacts have a tolerance of their own, far larger.
+PARALLEL_TOLERANCE = 1e-8
+
+# Fraction of the length of an edge by which corners outside of it still lie on the face: rounding, and edges that
+# coincide. Smaller: a box on a box of the same size loses corners of its patch.
+ON_EDGE = 1e-9

@@ -1,0 +1,85 @@
+"""Which bodies touch or overlap where they are now, and how deep."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from particlesim.core.constants import MAX_MANIFOLD
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
+from particlesim.core.math3d import dot, sub, to_vec3
+from particlesim.core.parallel import ThreadTeam
+from particlesim.geometry.narrow_phase.gjk import NO_SIMPLEX
+from particlesim.geometry.narrow_phase.pair import pair_overlaps, pair_separation
+from particlesim.model.bodies import placed
+from particlesim.model.domain import nearest_image
+from particlesim.model.system import System
+
+
+@kernel
+def offset_of(system, i, j):
+    """Position of body j from that of body i, by the shortest way round a periodic domain."""
+    a, b = system.body[i], system.body[j]
+    return nearest_image(sub(to_vec3(b.position), to_vec3(a.position)), system.domain[0].period)
+
+
+@entry_kernel
+def separation_of(system, i, j):
+    """Separation of bodies i < j where they are now [m]."""
+    system = without_refcounts(system)
+    points = np.empty((MAX_MANIFOLD, 3))
+    a, b = placed(system.body[i]), placed(system.body[j])
+    separation, _, _ = pair_separation(system.shapes, a, b, offset_of(system, i, j), NO_SIMPLEX, points)
+    return separation
+
+
+@entry_kernel
+def _mark_touching(system, pairs, touches, first, last):
+    """Mark which of the candidate pairs ``first .. last`` touch or overlap."""
+    system, pairs, touches = without_refcounts((system, pairs, touches))
+    points = np.empty((MAX_MANIFOLD, 3))
+    for k in range(first, last):
+        a, b = system.body[pairs[k, 0]], system.body[pairs[k, 1]]
+        offset = offset_of(system, pairs[k, 0], pairs[k, 1])
+        reach = a.radius + b.radius
+        touches[k] = dot(offset, offset) <= reach * reach and pair_overlaps(
+            system.shapes, placed(a), placed(b), offset, points
+        )
+
+
+def touching_pairs(system: System, pairs: np.ndarray) -> np.ndarray:
+    """The candidate pairs (m, 2) of bounded bodies that touch or overlap, in the order of ``pairs``."""
+    touches = np.empty(len(pairs), dtype=np.bool_)
+    ThreadTeam(len(pairs)).each(lambda _, first, last: _mark_touching(system, pairs, touches, first, last), len(pairs))
+    return pairs[touches]
+
+
+@entry_kernel
+def touching_half_spaces(system):
+    """Particles that touch or cross a half-space, (m, 2): the particle and the half-space."""
+    system = without_refcounts(system)
+    found = np.empty((64, 2), dtype=np.int64)
+    count = 0
+    for i in range(system.particles):
+        for j in range(system.bounded, len(system.body)):
+            if separation_of(system, i, j) <= 0.0:
+                if count == len(found):
+                    found = np.concatenate((found, np.empty_like(found)))
+                found[count, 0], found[count, 1] = i, j
+                count += 1
+    return found[:count]
+
+
+@entry_kernel
+def _deepest_of(system, pairs):
+    """The largest overlap among pairs of bodies [m]."""
+    system, pairs = without_refcounts((system, pairs))
+    deepest = 0.0
+    for k in range(len(pairs)):
+        deepest = max(deepest, -separation_of(system, pairs[k, 0], pairs[k, 1]))
+    return deepest
+
+
+def deepest_overlap(system: System, pairs: np.ndarray) -> float:
+    """The largest overlap among candidate pairs and with half-spaces [m]; 0 if nothing overlaps."""
+    touching = touching_pairs(system, pairs), touching_half_spaces(system)
+    return float(max(_deepest_of(system, contacts) for contacts in touching))

@@ -1,0 +1,62 @@
+"""What is simulated, as arrays: the model that a scene is built into, and what the solver's kernels take of it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from particlesim.core.records import cache_aligned
+from particlesim.geometry.shape_table import ShapeTable
+from particlesim.geometry.shapes import Shape
+
+
+class System(NamedTuple):
+    """Bodies and what they are made of, as the kernels take them.
+
+    Rows ``0 .. particles`` of ``body`` are dynamic, ``particles .. bounded`` obstacles of bounded extent, and
+    ``bounded ..`` half-spaces, which the broad phase knows nothing of.
+    """
+
+    shapes: ShapeTable
+    body: np.ndarray  # (n,) BODY
+    law: np.ndarray  # (m, m) CONTACT_LAW of materials
+    motion: np.ndarray  # (k,) MOTION
+    domain: np.ndarray  # (1,) DOMAIN
+    particles: int
+    bounded: int
+
+
+class Model(NamedTuple):
+    """A scene as arrays: the system, and what scripts and files want to know of it."""
+
+    shapes: tuple[Shape, ...]  # of the rows of the shape table, but for the half-spaces of walls
+    restitution: np.ndarray  # (m,) of each material
+    system: System
+
+    @property
+    def particles(self) -> np.ndarray:
+        """The records of the dynamic bodies, (n,) BODY, a view."""
+        return self.system.body[: self.system.particles]
+
+    def with_particles(self, particles: np.ndarray) -> Model:
+        """The model with other particles, (n,) BODY, in place of those that it has."""
+        old = self.system
+        body = cache_aligned(np.concatenate([particles, old.body[old.particles :]]))
+        count = len(particles)
+        system = old._replace(body=body, particles=count, bounded=old.bounded - old.particles + count)
+        return self._replace(system=system)
+
+    @property
+    def has_polyhedra(self) -> bool:
+        """Whether any body of bounded extent is more than a sphere."""
+        return not all(shape.is_sphere for shape in self.shapes) or self.system.bounded > self.system.particles
+
+
+def make_system(
+    shapes: ShapeTable, particles: np.ndarray, obstacles: np.ndarray, half_spaces: np.ndarray, **rest: np.ndarray
+) -> System:
+    """The system of these bodies, in the order that its rows have; ``rest`` are law, motion and domain."""
+    body = cache_aligned(np.concatenate([particles, obstacles, half_spaces]))
+    bounded = len(particles) + len(obstacles)
+    return System(shapes, body, particles=len(particles), bounded=bounded, **rest)

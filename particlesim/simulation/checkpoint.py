@@ -1,0 +1,112 @@
+"""Checkpoints: a model and the state of its solver as one file, from which a simulation goes on bitwise."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import zipfile
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from particlesim.core.atomic_write import atomic_write
+from particlesim.core.records import cache_aligned
+from particlesim.dynamics.solver_state import Counts, SolverState
+from particlesim.geometry.shape_table import ShapeTable
+from particlesim.geometry.shapes import Shape
+from particlesim.model.system import Model, System
+from particlesim.scene import Scene
+from particlesim.scene.file import SceneError, parse_scene
+
+_FORMAT = 1
+
+
+class CheckpointError(ValueError):
+    """A file is not a checkpoint that can be gone on from."""
+
+
+class Checkpoint(NamedTuple):
+    """What a checkpoint holds."""
+
+    scene: Scene
+    model: Model
+    state: SolverState
+    counts: Counts
+    done: dict[str, Any]  # steps, time_step [s], broad_phase
+
+
+def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
+    """Write a checkpoint to ``path``, whole or not at all. OSError if it cannot be written."""
+    scene, model, state, counts, done = checkpoint
+    system = model.system._asdict()
+    text = {
+        "format": _FORMAT,
+        "version": importlib.metadata.version("particlesim"),
+        "scene": scene.model_dump_json(),
+        "shapes": [_described(shape) for shape in model.shapes],
+        "particles": system.pop("particles"),
+        "bounded": system.pop("bounded"),
+        "done": done,
+    }
+    arrays = {f"shapes.{name}": array for name, array in system.pop("shapes")._asdict().items()}
+    arrays |= {f"system.{name}": array for name, array in system.items()}
+    arrays |= {f"state.{name}": array for name, array in state.arrays().items()}
+    arrays |= {f"counts.{name}": np.asarray(value) for name, value in asdict(counts).items()}
+    arrays["restitution"] = model.restitution
+    arrays["text"] = np.frombuffer(json.dumps(text).encode(), dtype=np.uint8)
+    with atomic_write(path) as hidden, open(hidden, "wb") as file:
+        np.savez(file, **arrays)
+
+
+def read_checkpoint(path: str | Path) -> Checkpoint:
+    """Read a checkpoint. CheckpointError if it is none, damaged or of another version; OSError if unreadable."""
+    path = Path(path)
+    with open(path, "rb") as file:
+        try:
+            with np.load(file, allow_pickle=False) as stored:
+                arrays = {name: stored[name] for name in stored.files}
+            text = json.loads(arrays.pop("text").tobytes())
+        except (ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError) as error:
+            raise CheckpointError(f"{path}: not a checkpoint of particlesim, or damaged") from error
+    if text.get("format") != _FORMAT:
+        raise CheckpointError(f"{path}: this version cannot go on from what particlesim {text.get('version')} wrote")
+    try:
+        return _assembled(text, arrays)
+    except (KeyError, TypeError, ValueError, SceneError) as error:
+        raise CheckpointError(f"{path}: damaged: {' '.join(str(error).split())}") from error
+
+
+def _assembled(text: dict[str, Any], arrays: dict[str, np.ndarray]) -> Checkpoint:
+    """The checkpoint of what was stored."""
+    shapes = ShapeTable(**_under("shapes.", arrays))
+    arrays["system.body"] = cache_aligned(arrays["system.body"])
+    system = System(shapes, particles=text["particles"], bounded=text["bounded"], **_under("system.", arrays))
+    model = Model(tuple(_shape(described) for described in text["shapes"]), arrays["restitution"], system)
+    counted = _under("counts.", arrays)
+    counts = Counts(**{f.name: _plain(counted[f.name]) for f in fields(Counts)})
+    state = SolverState.of_arrays(_under("state.", arrays))
+    return Checkpoint(parse_scene(json.loads(text["scene"])), model, state, counts, text["done"])
+
+
+def _under(prefix: str, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The arrays whose names begin with a prefix, by the rest of their names."""
+    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+
+
+def _plain(array: np.ndarray) -> Any:
+    return array.item() if array.ndim == 0 else array
+
+
+def _described(shape: Shape) -> dict[str, Any]:
+    """A shape as JSON, which keeps every bit of a float64."""
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in vars(shape).items()}
+
+
+def _shape(described: dict[str, Any]) -> Shape:
+    """The shape that was described."""
+    arrays = {name: np.array(described[name], dtype=np.float64) for name in ("moments", "orientation")}
+    vertices = np.array(described["vertices"], dtype=np.float64).reshape(-1, 3)
+    faces = tuple(tuple(loop) for loop in described["faces"])
+    return Shape(**{**described, **arrays, "vertices": vertices, "faces": faces})
