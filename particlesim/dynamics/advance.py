@@ -8,7 +8,7 @@ from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import axpy, dot, norm, set_quat, set_vec3, sub, to_quat, to_vec3
 from particlesim.dynamics.ccd.swept_bounds import largest_acceleration
 from particlesim.model.domain import nearest_image
-from particlesim.model.free_motion import angular_speed, free_acceleration, free_rotation, isotropic_rotation
+from particlesim.model.free_motion import angular_speed, free_rotation, isotropic_rotation
 
 
 @kernel
@@ -19,9 +19,8 @@ def _turns_round(position, lower, period):
 
 
 @kernel
-def _wrapped(b, position, domain):
+def _wrapped(b, position, lower, period):
     """A position brought back into a periodic domain; counts in the body's image how often it went round."""
-    lower, period = domain.lower, domain.period
     turns = (
         _turns_round(position[0], lower[0], period[0]),
         _turns_round(position[1], lower[1], period[1]),
@@ -39,11 +38,9 @@ def _wrapped(b, position, domain):
 
 
 @kernel
-def _fly(b, acceleration, time):
-    """Let a particle fly freely for ``time`` [s] from where its record has it."""
-    position, velocity, momentum = to_vec3(b.position), to_vec3(b.velocity), to_vec3(b.angular_momentum)
-    set_vec3(b.position, axpy(axpy(position, velocity, time), acceleration, 0.5 * time * time))
-    set_vec3(b.velocity, axpy(velocity, acceleration, time))
+def _turn(b, time):
+    """Let a particle turn freely for ``time`` [s]."""
+    momentum = to_vec3(b.angular_momentum)
     if dot(momentum, momentum) > 0.0:
         orientation, isotropic = to_quat(b.orientation), b.isotropic_inertia
         if isotropic > 0.0:
@@ -73,16 +70,21 @@ def advance(system, reference, duration, first, last):
     within their skins, going straight on; -1 if one has left it.
     """
     system, reference = without_refcounts((system, reference))
+    # Taken out of its record once: what is written to the bodies might be the domain, for all the compiler knows.
     domain = system.domain[0]
-    gravity = norm(to_vec3(domain.gravity))
-    longest = math.inf
+    lower, period, fall = to_vec3(domain.lower), to_vec3(domain.period), to_vec3(domain.gravity)
+    gravity, longest = norm(fall), math.inf
     for i in range(first, last):
         b = system.body[i]
-        _fly(b, free_acceleration(system, b), duration - b.time if b.disturbed != 0 else duration)
-        position = _wrapped(b, to_vec3(b.position), domain)
+        time = duration - b.time if b.disturbed != 0 else duration
+        acceleration = fall if b.resting == 0 else (0.0, 0.0, 0.0)
+        velocity = to_vec3(b.velocity)
+        position = axpy(axpy(to_vec3(b.position), velocity, time), acceleration, 0.5 * time * time)
+        position, velocity = _wrapped(b, position, lower, period), axpy(velocity, acceleration, time)
         set_vec3(b.position, position)
-        speed = norm(to_vec3(b.velocity))
-        longest = min(longest, _time_within_skin(position, speed, gravity, reference[i], domain.period))
+        set_vec3(b.velocity, velocity)
+        _turn(b, time)
+        longest = min(longest, _time_within_skin(position, norm(velocity), gravity, reference[i], period))
     return longest
 
 
