@@ -53,13 +53,6 @@ class Images(NamedTuple):
     margin: np.ndarray  # (3,) float32, for the rounding
 
 
-class NearList(NamedTuple):
-    """AABBs near a leaf."""
-
-    soa: np.ndarray  # (6, _LIST + _OWN + LANES) float32
-    places: np.ndarray  # (_LIST + _OWN + LANES,) uint32, where they are in the tree
-
-
 # Along an axis: no shift, or one period either way.
 _DIRECTIONS = np.array([0.0, 1.0, -1.0])
 

@@ -56,15 +56,6 @@ def store_vec3(array, index, v):
 
 
 @kernel
-def store_quat(array, index, q):
-    """Write quaternion ``q`` as row ``index`` of an (n, 4) array."""
-    array[index, 0] = q[0]
-    array[index, 1] = q[1]
-    array[index, 2] = q[2]
-    array[index, 3] = q[3]
-
-
-@kernel
 def grow(array):
     """An array with the rows of this one and room for as many again."""
     longer = np.empty((2 * array.shape[0], array.shape[1]), dtype=array.dtype)
