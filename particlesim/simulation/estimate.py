@@ -33,26 +33,26 @@ def estimate(scene: Scene) -> list[tuple[str, str]]:
 
 def _particle_rows(simulation: Simulation) -> list[tuple[str, str]]:
     """How many particles there are in all and in each group, with their shape, sizes and mass."""
-    constants, groups = simulation.particles, simulation.scene.particles
-    rows = [("particles", f"{len(constants.size):,}")]
-    for g, group in enumerate(groups):
-        members = np.flatnonzero(constants.group == g)
+    particles = simulation.model.particles
+    rows = [("particles", f"{len(particles):,}")]
+    for g, group in enumerate(simulation.scene.particles):
+        members = particles[particles["group"] == g]
         rows.append((f"  {group.name or f'particles[{g}]'}", _group(simulation, members) if len(members) else "none"))
     return rows
 
 
 def _group(simulation: Simulation, members: np.ndarray) -> str:
-    constants = simulation.particles
-    shape, sizes = simulation.model.shapes[int(constants.shape[members[0]])], constants.size[members]
+    """What the particles of a group (m,) BODY amount to."""
+    shape, sizes = simulation.model.shapes[int(members["shape_row"][0])], members["scale"]
     span = f"{sizes.min():g}" if sizes.min() == sizes.max() else f"{sizes.min():g} to {sizes.max():g}"
-    return f"{len(members):,} x {shape.name}, size {span}, mass {constants.mass[members].sum():.4g} kg"
+    return f"{len(members):,} x {shape.name}, size {span}, mass {members['mass'].sum():.4g} kg"
 
 
 def _volume(simulation: Simulation) -> float:
     """Of all particles [m^3]."""
-    constants = simulation.particles
+    particles = simulation.model.particles
     volumes = np.array([shape.volume for shape in simulation.model.shapes])
-    return float((volumes[constants.shape] * constants.size**3).sum()) if len(constants.size) else 0.0
+    return float((volumes[particles["shape_row"]] * particles["scale"] ** 3).sum()) if len(particles) else 0.0
 
 
 def _time_step(simulation: Simulation) -> str:
