@@ -113,23 +113,44 @@ def _later_places(pairs, sphere, order, particles, period, later_start, first, l
 
 
 @entry_kernel
-def _both_ways(later_start, later, start, other):
-    """Write all neighbours of each place, unsorted, and where they begin into ``start``, which is 0 and longer by 2."""
-    later_start, later, start, other = without_refcounts((later_start, later, start, other))
-    count = len(later_start) - 1
-    for p in range(count):
-        start[p + 2] += later_start[p + 1] - later_start[p]
-        for k in range(later_start[p], later_start[p + 1]):
-            start[later[k] + 2] += 1
-    for k in range(2, count + 2):
-        start[k] += start[k - 1]
-    for p in range(count):
+def _count_earlier(later_start, later, counts, first, last):
+    """For each place, how many of the places ``first .. last`` have it among their later neighbours."""
+    later_start, later, counts = without_refcounts((later_start, later, counts))
+    for k in range(later_start[first], later_start[last]):
+        counts[later[k]] += 1
+
+
+@entry_kernel
+def _write_both_ways(later_start, later, cursors, start, other, first, last):
+    """Write places ``first .. last`` as neighbours of their later ones, and these as theirs.
+
+    Earlier neighbours of a place go where ``cursors`` says, later ones to the end of its row.
+    """
+    later_start, later, cursors, start, other = without_refcounts((later_start, later, cursors, start, other))
+    for p in range(first, last):
+        own = start[p + 1] - later_start[p + 1]
         for k in range(later_start[p], later_start[p + 1]):
             q = later[k]
-            other[start[p + 1]] = q
-            start[p + 1] += 1
-            other[start[q + 1]] = p
-            start[q + 1] += 1
+            other[own + k] = q
+            other[cursors[q]] = p
+            cursors[q] += 1
+
+
+def _both_ways(later_start: np.ndarray, later: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All neighbours of each place, the earlier ones first, and where they begin: (start, other)."""
+    count = len(later_start) - 1
+    team = ThreadTeam(count)
+    counts = np.zeros((team.threads, count), dtype=np.int64)  # of the earlier ones, by the thread that has them
+    team.each(lambda block, first, last: _count_earlier(later_start, later, counts[block], first, last), count)
+    start = np.zeros(count + 1, dtype=np.int64)
+    np.cumsum(counts.sum(axis=0) + np.diff(later_start), out=start[1:])
+    cursors = start[:-1] + counts.cumsum(axis=0) - counts
+    other = np.empty(2 * len(later), dtype=np.int32)
+    team.each(
+        lambda block, first, last: _write_both_ways(later_start, later, cursors[block], start, other, first, last),
+        count,
+    )
+    return start, other
 
 
 @entry_kernel
@@ -173,12 +194,10 @@ def find_neighbours(
         )
     )
     later_start = later_start.cumsum()
-    start = np.zeros(count + 2, dtype=np.int64)
-    other = np.empty(2 * len(later), dtype=np.int32)
-    _both_ways(later_start, later, start, other)
+    start, other = _both_ways(later_start, later)
     normal = np.zeros((len(later) if with_normals else 0, 3), dtype=np.float32)
     reference = np.column_stack((position, skin))
-    return NeighbourList(*order, reference, start[:-1], other, later_start, later, normal), tested, candidates
+    return NeighbourList(*order, reference, start, other, later_start, later, normal), tested, candidates
 
 
 def sort_neighbours(neighbours: NeighbourList) -> None:

@@ -24,7 +24,7 @@ from particlesim.dynamics.contact.resting import Borne, RestingContacts, forget_
 from particlesim.dynamics.events.collision_prediction import Predicted, bound_paths, predict, predict_across
 from particlesim.dynamics.events.event_queue import run_islands
 from particlesim.dynamics.events.islands import Islands, add_up, newly_touched, unite
-from particlesim.dynamics.events.paths import Paths, extended, forget, new_clocks, no_segments, rewind
+from particlesim.dynamics.events.paths import Paths, extended, forget, new_clocks, no_segments, rewind, with_room
 from particlesim.dynamics.neighbour_list import (
     FindPairs,
     NeighbourList,
@@ -86,6 +86,8 @@ class Solver:
         self._clock = new_clocks(len(system.body))
         self._accumulator = np.zeros((system.particles, ACCUMULATED if len(system.body) > system.bounded else WALLS))
         self._bound = np.zeros(system.bounded, dtype=BOUND)  # scratch, by place
+        self._segments = no_segments()  # scratch, with room for those of the substeps so far
+        self._periodic_room = _periodic_room(system)
 
     def change_particles(self, particles: np.ndarray, origin: np.ndarray) -> None:
         """Let there be other particles from now on.
@@ -123,7 +125,7 @@ class Solver:
             skin=skin,
             time_within_skins=-1.0,
             neighbours=neighbours,
-            standing=np.zeros(len(body), dtype=np.int64),
+            standing=np.zeros(len(body) if known else 0, dtype=np.int64),
             seen=seen,
             displacement=np.zeros(known),
             clearance=np.empty(0),
@@ -158,12 +160,9 @@ class Solver:
 
     def _periodic_limit(self, fastest: float) -> float:
         """In how long [s] two bodies that close in at twice the ``fastest`` speed [m/s] come near another image."""
-        domain, radius = self._system.domain[0], self._system.body["radius"][: self._system.bounded]
-        periods = domain["period"][domain["period"] > 0.0]
-        if not len(periods):
+        if self._periodic_room == math.inf:
             return math.inf
-        room = PERIODIC_ROOM * (0.5 * periods.min() - 2.0 * radius.max())
-        return _time_for(max(room, 1e-3 * radius.min()), fastest, float(np.linalg.norm(domain["gravity"])))
+        return _time_for(self._periodic_room, fastest, float(np.linalg.norm(self._system.domain[0]["gravity"])))
 
     def step(self, duration: float) -> None:
         """Move all bodies on by ``duration`` [s], in as many equal substeps as that is long."""
@@ -250,7 +249,7 @@ class Solver:
             lambda _, first, last: advance(system, state.neighbours.reference, duration, first, last),
             system.particles,
         )
-        place_kinematic(system.body, system.motion, state.time)
+        place_kinematic(system.body[system.particles :], system.motion, state.time)
         times.append(time_within_skins(system, state.neighbours.reference, system.particles, system.bounded))
         state.time_within_skins = min(times)
         forget(self._clock, system.body, self._disturbed)
@@ -300,7 +299,9 @@ class Solver:
             count,
             4 * team.threads,
         )
-        return extended(paths, [segments for segments, _ in parts]), sum(left for _, left in parts)
+        segments = [segments for segments, _ in parts]
+        self._segments = with_room(self._segments, len(paths.segment), sum(map(len, segments)))
+        return extended(paths, segments, self._segments), sum(left for _, left in parts)
 
     def _predict_across(
         self, paths: Paths, members: np.ndarray, first_segment: int, duration: float, again: bool
@@ -346,6 +347,15 @@ def _set_tolerances(system: System) -> None:
     domain["rest_speed"] = APPROACH_TOLERANCE * math.sqrt(2.0 * float(np.abs(gravity) @ size))
     loses = system.law["restitution"].min(initial=1.0) < 1.0
     domain["penetration_slop"] = RESTING_PENETRATION_SLOP if gravity.any() and loses else PENETRATION_SLOP
+
+
+def _periodic_room(system: System) -> float:
+    """How far two bodies may both go on periodic axes [m] without coming near another image; inf without such axes."""
+    period, radius = system.domain[0]["period"], system.body["radius"][: system.bounded]
+    periods = period[period > 0.0]
+    if not len(periods) or not len(radius):
+        return math.inf
+    return max(PERIODIC_ROOM * (0.5 * periods.min() - 2.0 * radius.max()), 1e-3 * radius.min())
 
 
 def _time_for(distance: float, speed: float, acceleration: float) -> float:

@@ -41,7 +41,7 @@ class SolverState:
     skin: np.ndarray  # (n,) of each bounded body [m]
     time_within_skins: float  # for how long the neighbour list is certainly true [s]
     neighbours: NeighbourList
-    standing: np.ndarray  # (n,) int64: FREE, SETTLES or LOOSE
+    standing: np.ndarray  # (n,) int64: FREE, SETTLES or LOOSE, (0,) where nothing comes to rest
     seen: np.ndarray  # (n,) SEEN, (0,) where nothing comes to rest
     displacement: np.ndarray  # (n,) how far surfaces have come [m], (0,) where nothing comes to rest
     clearance: np.ndarray  # beside ``neighbours.other``: how far apart they were, plus displacements [m]

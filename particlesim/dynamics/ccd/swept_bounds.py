@@ -100,6 +100,12 @@ def bounds_apart(a, b, periods):
 
 
 @kernel
+def _settles(standing, i):
+    """Whether a body settles with others; ``standing`` is empty where nothing comes to rest."""
+    return len(standing) > 0 and standing[i] == SETTLES
+
+
+@kernel
 def _impact_time(spheres, a, b, period, duration):
     """When two bodies that accelerate alike collide, from their bounds; LOOK_CLOSER where that does not tell."""
     offset = nearest_image(sub(to_vec3(b.position), to_vec3(a.position)), period)
@@ -130,7 +136,7 @@ def cull_pairs(system, neighbours, bound, standing, alike, duration, first, last
                 continue
             one, two = (p, q) if neighbours.body[p] < neighbours.body[q] else (q, p)
             i, j = neighbours.body[one], neighbours.body[two]
-            if standing[i] == SETTLES and standing[j] == SETTLES:
+            if _settles(standing, i) and _settles(standing, j):
                 continue
             time = LOOK_CLOSER
             if alike:
@@ -182,7 +188,7 @@ def cull_half_spaces(system, standing, duration, first, last):
     found = np.empty((len(system.body) - system.bounded) * (last - first), dtype=CANDIDATE)
     count = 0
     for i in range(first, last):
-        if standing[i] == SETTLES:
+        if _settles(standing, i):
             continue
         for j in range(system.bounded, len(system.body)):
             time = _half_space_time(system, system.body[i], system.body[j], duration)

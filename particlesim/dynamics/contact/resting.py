@@ -86,7 +86,7 @@ class RestingContacts:
 
     def longest_substep(self, state: SolverState) -> float:
         """How long a substep may be [s]: not so long that what came to rest were not looked at."""
-        if not len(self._resting):
+        if self._gravity == 0.0 or not len(self._resting):
             return self._last_bounces
         in_time = RESTING_DISPLACEMENT * self._inradius / max(state.pressed_speed, 1e-300)
         return min(max(in_time, SHORTEST_RESTING_SUBSTEP * self._last_bounces), self._last_bounces)

@@ -242,7 +242,8 @@ def predict(
 ) -> Predicted:
     """All first impacts within ``duration`` [s] if every body goes on as it is.
 
-    ``bound`` (n,) BOUND is filled in. ``standing`` (n,) says what settles together: that does not collide.
+    ``bound`` (n,) BOUND is filled in. ``standing`` (n,) says what settles together: that does not collide; it is empty
+    where nothing comes to rest.
     """
     team = ThreadTeam(system.bounded)
     alike = all(

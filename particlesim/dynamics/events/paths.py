@@ -7,12 +7,14 @@ compared afterwards.
 
 from __future__ import annotations
 
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
 
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import set_quat, set_vec3, to_quat, to_vec3
+from particlesim.core.parallel import ThreadTeam
 from particlesim.core.records import record
 from particlesim.model.prescribed_motion import NO_SWING
 
@@ -101,10 +103,12 @@ def path_of_segment(system, segment):
 
 
 @entry_kernel
-def _chain(clock, segment, first):
-    """Chain the segments from ``first`` on to those of the same particle before them."""
-    clock, segment = without_refcounts((clock, segment))
-    for m in range(first, len(segment)):
+def _append(clock, segment, part, first):
+    """Write the segments of a part from row ``first`` on, chained to those of the same particle before them."""
+    clock, segment, part = without_refcounts((clock, segment, part))
+    for k in range(len(part)):
+        m = first + k
+        segment[m] = part[k]
         c = clock[segment[m].particle]
         segment[m].next = -1
         if c.first_segment < 0:
@@ -114,12 +118,28 @@ def _chain(clock, segment, first):
         c.last_segment = m
 
 
-def extended(paths: Paths, parts: list[np.ndarray]) -> Paths:
-    """The paths with more segments, chained."""
-    first = len(paths.segment)
-    segment = np.concatenate([paths.segment, *parts])
-    _chain(paths.clock, segment, first)
-    return Paths(paths.clock, segment)
+def with_room(room: np.ndarray, used: int, more: int) -> np.ndarray:
+    """Room (m,) SEGMENT for ``more`` segments after the ``used`` ones in ``room``: that itself if it is enough."""
+    if used + more <= len(room):
+        return room
+    larger = np.empty(max(used + more, 2 * len(room)), dtype=SEGMENT)
+    larger[:used] = room[:used]
+    return larger
+
+
+def extended(paths: Paths, parts: list[np.ndarray], room: np.ndarray) -> Paths:
+    """The paths with more segments, chained, in ``room`` after those that they have, which are at its front already.
+
+    No particle has segments in two of the parts.
+    """
+    first = list(accumulate(map(len, parts), initial=len(paths.segment)))
+
+    def append(_: int, begin: int, end: int) -> None:
+        for part in range(begin, end):
+            _append(paths.clock, room, parts[part], first[part])
+
+    ThreadTeam(first[-1] - first[0]).each(append, len(parts), len(parts))
+    return Paths(paths.clock, room[: first[-1]])
 
 
 @entry_kernel
