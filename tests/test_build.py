@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
 import particlesim as ps
+from particlesim.model.materials import Material, contact_laws
 from particlesim.setup.build import build
 from particlesim.setup.placement import lattice_points
 
@@ -86,6 +87,48 @@ def test_restitution_is_the_groups_or_the_worlds():
     assert made.restitution[made.system.body["material"][made.system.bounded :]].tolist() == [0.9] * 6
     laws = made.system.law["restitution"]
     assert laws.tolist() == [[0.9, 0.9, 0.5], [0.9, 0.9, 0.5], [0.5, 0.5, 0.5]]
+
+
+def test_a_surface_is_the_groups_or_the_worlds_and_a_pair_takes_the_smaller_value():
+    smooth = {"friction": 0.1, "rolling_friction": 0.002}
+    rough = {"friction": 0.7, "static_friction": 0.9, "tangential_restitution": 0.5}
+    walls = {"friction": 0.4, "tangential_restitution": -0.5, "rolling_friction": 0.001}
+    laws = built(spheres(1), spheres(1, **smooth), spheres(1, **rough), world=walls).system.law
+    assert laws["friction"][0].tolist() == [0.4, 0.4, 0.1, 0.4]
+    assert laws["friction"][3].tolist() == [0.4, 0.4, 0.1, 0.7]
+    assert laws["static_friction"][3].tolist() == [0.4, 0.4, 0.1, 0.9]
+    assert laws["rolling_friction"][2].tolist() == [0.001, 0.001, 0.002, 0.001]
+    assert laws["tangential_restitution"][3].tolist() == [-0.5, -0.5, -0.5, 0.5]
+    for name in laws.dtype.names:
+        assert np.array_equal(laws[name], laws[name].T)
+
+
+def test_contacts_between_groups_override_what_their_surfaces_say():
+    groups = spheres(1, name="a", friction=0.2), spheres(1, name="b", restitution=0.5), spheres(1)
+    contacts = [
+        {"between": ["a", "b"], "restitution": 0.9, "friction": 0.8},
+        {"between": ["walls", "b"], "static_friction": 0.9},
+        {"between": ["b", "b"], "tangential_restitution": 1.0},
+    ]
+    laws = built(*groups, world={"friction": 0.3}, contact=contacts).system.law
+    assert laws["restitution"].tolist() == [[1, 1, 0.5, 1], [1, 1, 0.9, 1], [0.5, 0.9, 0.5, 0.5], [1, 1, 0.5, 1]]
+    assert laws["friction"].tolist() == [
+        [0.3, 0.2, 0.3, 0.3],
+        [0.2, 0.2, 0.8, 0.2],
+        [0.3, 0.8, 0.3, 0.3],
+        [0.3, 0.2, 0.3, 0.3],
+    ]
+    assert laws["static_friction"][2].tolist() == [0.9, 0.8, 0.3, 0.3]
+    assert laws["tangential_restitution"][2].tolist() == [0, 0, 1, 0]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "allowed"),
+    [("restitution", 1.5, "0 to 1"), ("friction", -1.0, "0 to inf"), ("tangential_restitution", math.nan, "-1 to 1")],
+)
+def test_materials_from_python_are_checked(name, value, allowed):
+    with pytest.raises(ValueError, match=f"{name} of a material must be a number from {allowed}, not {value:g}"):
+        contact_laws([Material(), Material(**{name: value})])
 
 
 def test_boundaries_are_set_axis_by_axis():

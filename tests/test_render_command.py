@@ -185,6 +185,15 @@ def test_a_twin_scales_every_length_mass_and_range():
     assert (none.count, alone.number, alone.size.value) == (0, 1, 0.3)
 
 
+def test_a_twin_scales_rolling_friction():
+    rough = {"shape": "sphere", "size": 0.2, "rolling_friction": 0.002}
+    groups = {**rough, "count": 80, "name": "a"}, {**listed("sphere", {"position": (1, 1, 1)}), **rough}
+    contact = [{"between": ["a", "walls"], "rolling_friction": 0.003}]
+    twin = scaled(scene(*groups, rolling_friction=0.001, contact=contact), 0.125)
+    tables = twin.world, *twin.particles, *twin.contact
+    assert [table.rolling_friction for table in tables] == pytest.approx([0.002, 0.004, 0.002, 0.006])
+
+
 def test_a_scene_of_lists_has_no_twin():
     with pytest.raises(ps.SceneError, match="particles: all of them are placed by lists, which cannot be scaled"):
         scaled(scene(listed("cube", {"position": (0, 0, 0)})), 0.5)

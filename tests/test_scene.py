@@ -26,6 +26,8 @@ size = [4, 5, 6]
 boundary = ["wall", "periodic", "open"]
 gravity = [0, 0, -9.81]
 restitution = 0.9
+friction = 0.4
+rolling_friction = 0.001
 
 [[particles]]
 shape = "sphere"
@@ -43,6 +45,9 @@ shape = { kind = "box", edges = [1, 2, 3], rounding = 0.25 }
 size = { kind = "log-uniform", low = 0.1, high = 0.3 }
 mass = 2
 restitution = 0.5
+friction = 0.3
+static_friction = 0.5
+tangential_restitution = -0.2
 placement = { kind = "list", poses = [
     { position = [0, 0, 0] },
     { position = [1, 0, 0], orientation = [1, 1, 0, 0], velocity = [0, 1, 0], spin = [0, 0, 1] },
@@ -57,6 +62,15 @@ orientation = { axis = [0, 0, 1], angle = 45 }
 velocity = { kind = "outward", speed = 2 }
 spin = { kind = "uniform", speed = 3 }
 colour = "#ff8800"
+
+[[contact]]
+between = ["two", "walls"]
+restitution = 0.7
+friction = 0.1
+
+[[contact]]
+between = ["two", "two"]
+static_friction = 0.6
 
 [solver]
 broad_phase = "grid"

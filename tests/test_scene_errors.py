@@ -9,7 +9,7 @@ from particlesim.setup.build import build
 WORLD = "[world]\nsize = [4.0, 4.0, 4.0]\n"
 GROUP = '[[particles]]\nshape = "sphere"\ncount = 10\nsize = 0.2\n'
 GOOD = WORLD + GROUP
-ALL_KEYS = "title, seed, duration, world, particles, solver, movie, camera, show"
+ALL_KEYS = "title, seed, duration, world, particles, contact, solver, movie, camera, show"
 VECTOR = "must be a list of 3 finite numbers, [x, y, z]"
 COUNT = "must be a whole number from 0 to 100,000,000"
 SIZE = 'must be a number above 0, or a table such as { kind = "uniform", low = 0.1, high = 0.2 }'
@@ -20,6 +20,7 @@ ROWS = (
     "must be true, false or a list of 'time', 'particles', 'impacts', 'energy change', 'temperature', 'pressure', "
     "'speed', 'pairs tested' or 'broad phases'"
 )
+TWO = "must be the names of two groups, or of one and 'walls', such as ['a', 'b']"
 RANGE = "must be [low, high], two numbers, low below high"
 PIXELS = "must be [width, height] in pixels, two even whole numbers from 64 to 7680"
 
@@ -32,6 +33,15 @@ def world(**keys):
 def group(**keys):
     """A scene whose group has these keys instead of the usual ones; None takes one away."""
     return WORLD + "[[particles]]\n" + _lines({"shape": '"sphere"', "count": "10", "size": "0.2", **keys})
+
+
+def contact(**keys):
+    """A scene of the groups a and b whose first contact has these keys."""
+    return group(name='"a"') + GROUP + 'name = "b"\n' + _contact(**keys)
+
+
+def _contact(**keys):
+    return "[[contact]]\n" + _lines(keys)
 
 
 def poses(*listed):
@@ -153,6 +163,45 @@ BROKEN = [
         "particles[0].size: low must not be above high, but 2 is above 1",
     ),
     (group(restitution="1.5"), "particles[0].restitution = 1.5: must be a number from 0 to 1"),
+    # Surfaces.
+    (group(friction="-0.1"), "particles[0].friction = -0.1: must be a number of 0 or more"),
+    (world(friction="inf"), "world.friction = inf: must be a number of 0 or more"),
+    (world(rolling_friction='"0.1"'), 'world.rolling_friction = "0.1": must be a number of 0 or more'),
+    (
+        group(tangential_restitution="-1.1"),
+        "particles[0].tangential_restitution = -1.1: must be a number from -1 to 1",
+    ),
+    (
+        group(friction="0.5", static_friction="0.3"),
+        "particles[0]: static_friction is 0.3, but must not be below friction, 0.5",
+    ),
+    (
+        world(friction="0.5", static_friction="0.3"),
+        "world: static_friction is 0.3, but must not be below friction, 0.5",
+    ),
+    (group(name='"walls"'), 'particles[0].name = "walls": the walls have this name already'),
+    (
+        group(name='"a"') + GROUP + GROUP + 'name = "a"\n',
+        'particles[2].name = "a": particles[0] has this name already',
+    ),
+    (contact(friction="0.5"), "contact[0]: the key 'between' is missing"),
+    (contact(between='["a"]'), f'contact[0].between = ["a"]: {TWO}'),
+    (contact(between='"a"'), f'contact[0].between = "a": {TWO}'),
+    (
+        contact(between='["a", "wall"]'),
+        'contact[0].between = ["a", "wall"]: no group has the name "wall"; did you mean \'walls\'?',
+    ),
+    (contact(between='["walls", "walls"]'), 'contact[0].between = ["walls", "walls"]: walls do not touch each other'),
+    (
+        contact(between='["a", "b"]') + _contact(between='["b", "a"]'),
+        'contact[1].between = ["b", "a"]: contact[0] is between these two already',
+    ),
+    (contact(between='["a", "b"]', frction="0.5"), "contact[0].frction = 0.5: unknown key; did you mean 'friction'?"),
+    (
+        contact(between='["a", "b"]', friction="0.5", static_friction="0.3"),
+        "contact[0]: static_friction is 0.3, but must not be below friction, 0.5",
+    ),
+    (GOOD + "[contact]\n", "contact: must be a list of tables: write [[contact]], in two pairs of brackets"),
     (world(boundary='"wal"'), f"world.boundary = \"wal\": {BOUNDARY}; did you mean 'wall'?"),
     (world(boundary='["wall", "open"]'), f'world.boundary = ["wall", "open"]: {BOUNDARY}, for x, y and z'),
     (world(size="[4.0, 4.0]"), "world.size = [4.0, 4.0]: must be a list of 3 numbers above 0, [x, y, z]"),

@@ -12,6 +12,9 @@ from particlesim.scene.file import load_scene
 from particlesim.scene.overrides import scaled
 from particlesim.trajectory.frames import Ledger
 
+# Keys of surfaces.
+SURFACE = "restitution", "friction", "static_friction", "rolling_friction", "tangential_restitution"
+
 # A scene of more particles than this is tested by a twin with as many.
 MOST = 4000
 
@@ -23,7 +26,7 @@ def listed(shape: Any, *poses: dict[str, Any], **group: Any) -> dict[str, Any]:
 
 def scene(*groups: dict[str, Any], size: Any = (20.0, 20.0, 20.0), step: Any = "auto", **settings: Any) -> Scene:
     """A scene of the given groups; ``settings`` that the world knows go there, others to the scene itself."""
-    of_world = {key: settings.pop(key) for key in ("boundary", "gravity", "restitution") if key in settings}
+    of_world = {key: settings.pop(key) for key in ("boundary", "gravity", *SURFACE) if key in settings}
     world = {"size": size, **of_world}
     solver = {"broad_phase": settings.pop("broad_phase", "octree"), "time_step": step}
     return Scene(world=world, particles=list(groups), solver=solver, **settings)

@@ -13,7 +13,8 @@ from pydantic import Field, model_validator
 from particlesim.scene.base import MAX_COUNT, Model, PlainFloat, Text, whole
 from particlesim.scene.camera import Camera, FixedCamera, Movie, Show
 from particlesim.scene.groups import Group
-from particlesim.scene.messages import must_be
+from particlesim.scene.messages import hint, must_be, shown
+from particlesim.scene.surface import WALLS, Contact
 from particlesim.scene.world import Solver, World
 
 
@@ -25,6 +26,7 @@ class Scene(Model):
     duration: Annotated[PlainFloat, Field(gt=0, le=1e9), must_be("a number of seconds above 0, up to 1e9")] = 10.0
     world: World
     particles: Annotated[list[Group], Field(min_length=1)]
+    contact: list[Contact] = Field(default_factory=list)
     solver: Solver = Field(default_factory=Solver)
     movie: Movie = Field(default_factory=Movie)
     camera: Camera = Field(default_factory=lambda: FixedCamera(kind="fixed"))
@@ -36,6 +38,32 @@ class Scene(Model):
         for g, group in enumerate(self.particles):
             if group.colour_range and ranges.setdefault(group.colour, group.colour_range) != group.colour_range:
                 raise ValueError(f"particles[{g}] has another colour_range for {group.colour} than a group before it")
+        return self
+
+    @model_validator(mode="after")
+    def _names_tell_groups_apart(self) -> Scene:
+        known = {WALLS: "the walls have"}
+        for g, group in enumerate(self.particles):
+            if group.name in known:
+                raise ValueError(f"particles[{g}].name = {shown(group.name)}: {known[group.name]} this name already")
+            if group.name is not None:
+                known[group.name] = f"particles[{g}] has"
+        return self
+
+    @model_validator(mode="after")
+    def _contacts_are_between_groups(self) -> Scene:
+        names = [WALLS, *(group.name for group in self.particles if group.name is not None)]
+        before: dict[frozenset[str], int] = {}
+        for c, contact in enumerate(self.contact):
+            where = f"contact[{c}].between = {shown(contact.between)}"
+            for name in contact.between:
+                if name not in names:
+                    raise ValueError(f"{where}: no group has the name {shown(name)}{hint(name, names)}")
+            pair = frozenset(contact.between)
+            if pair == {WALLS}:
+                raise ValueError(f"{where}: walls do not touch each other")
+            if before.setdefault(pair, c) != c:
+                raise ValueError(f"{where}: contact[{before[pair]}] is between these two already")
         return self
 
     @model_validator(mode="after")

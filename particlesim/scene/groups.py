@@ -36,6 +36,7 @@ from particlesim.scene.base import (
     whole,
 )
 from particlesim.scene.messages import hint, listed, must_be, one_of
+from particlesim.scene.surface import Surface
 
 # The scene file names polyhedra without parameters as core.polyhedra does.
 _PolyhedronName: Any = Literal.__getitem__(tuple(POLYHEDRA))
@@ -335,8 +336,11 @@ def _rising(value: tuple[float, float]) -> tuple[float, float]:
 Range = Annotated[tuple[Number, Number], AfterValidator(_rising), must_be("[low, high], two numbers, low below high")]
 
 
-class Group(Model):
-    """Particles of one shape, one law of sizes and one start."""
+class Group(Surface):
+    """Particles of one shape, one law of sizes, one surface and one start.
+
+    The world says how the surface is where the group does not; a pair takes the smaller of its two values.
+    """
 
     name: Text | None = None
     shape: AnyShape
@@ -346,7 +350,6 @@ class Group(Model):
     size: Size = Field(default_factory=lambda: FixedSize(kind="fixed", value=1.0))
     density: Positive | None = None  # [kg/m^3]; 1000 if neither it nor the mass is given
     mass: Positive | None = None  # [kg]
-    restitution: Fraction | None = None  # the world's if not given; a pair takes the smaller of its two
     placement: Placement = Field(default_factory=lambda: RandomPlacement(kind="random"))
     orientation: AnyOrientation = "random"
     velocity: Velocity = Field(default_factory=lambda: Rest(kind="rest"))

@@ -9,6 +9,8 @@ from particlesim.scene import Scene
 from particlesim.scene.base import MAX_COUNT, Model
 from particlesim.scene.file import SceneError, parse_scene
 from particlesim.scene.groups import Group, ListPlacement
+from particlesim.scene.surface import Contact
+from particlesim.scene.world import World
 
 # What decides how a scene is drawn, beside the colours of its groups.
 _LOOK = "camera", "movie", "show"
@@ -53,9 +55,9 @@ def with_look(scene: Scene, other: Scene) -> Scene:
 def scaled(scene: Scene, factor: float) -> Scene:
     """A twin of the scene with ``factor`` times as many particles that fill the same part of the world.
 
-    Sizes and the spacing of lattices are multiplied by factor^(-1/3); a given mass and temperatures by 1 / factor, so
-    that density, speeds, energy and pressure stay. Particles of a list stay as they are. SceneError if there are no
-    others, or too many.
+    Sizes, the spacing of lattices and rolling friction are multiplied by factor^(-1/3); a given mass and temperatures
+    by 1 / factor, so that density, speeds, energy and pressure stay. Particles of a list stay as they are. SceneError
+    if there are no others, or too many.
     """
     counted = [group for group in scene.particles if not isinstance(group.placement, ListPlacement)]
     if not counted:
@@ -65,10 +67,22 @@ def scaled(scene: Scene, factor: float) -> Scene:
         raise SceneError(f"would be {number:,}; there may be up to {MAX_COUNT:,}", "particles")
     return replaced(
         scene,
+        world=_rolling(scene.world, factor),
         particles=[
             group if isinstance(group.placement, ListPlacement) else _scaled(group, factor) for group in scene.particles
         ],
+        contact=[_rolling(contact, factor) for contact in scene.contact],
     )
+
+
+def _length(factor: float) -> float:
+    """By how much larger ``factor`` times as many particles are."""
+    return factor ** (-1.0 / 3.0)
+
+
+def _rolling(table: World | Contact, factor: float) -> Any:
+    """A table whose rolling friction, if there is any, is that of a twin."""
+    return _times(table, _length(factor), "rolling_friction") if table.rolling_friction else table
 
 
 def _scaled_count(group: Group, factor: float) -> int:
@@ -78,9 +92,9 @@ def _scaled_count(group: Group, factor: float) -> int:
 
 def _scaled(group: Group, factor: float) -> dict[str, Any]:
     """The table of a group with ``factor`` times as many particles."""
-    length, energy = factor ** (-1.0 / 3.0), 1.0 / factor
+    length, energy = _length(factor), 1.0 / factor
     return {
-        **dict(group),
+        **_times(group, length, "rolling_friction"),
         "count": _scaled_count(group, factor),
         "size": _times(group.size, length, "value", "low", "high"),
         "placement": _times(group.placement, length, "spacing"),

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from particlesim.scene.base import (
     Fraction,
     Model,
+    NotNegative,
     PositiveNumber,
     PositiveVector,
     Vector,
@@ -16,6 +17,7 @@ from particlesim.scene.base import (
     whole,
 )
 from particlesim.scene.messages import hint, listed, must_be
+from particlesim.scene.surface import TangentialRestitution, check_static
 
 Boundary = Literal["wall", "periodic", "open"]
 _BOUNDARIES = "wall", "periodic", "open"
@@ -43,6 +45,22 @@ class World(Model):
     ] = ("wall", "wall", "wall")
     gravity: Vector = (0.0, 0.0, 0.0)  # [m/s^2]
     restitution: Fraction = 1.0
+    friction: NotNegative = 0.0  # Coulomb's coefficient while surfaces slide
+    static_friction: NotNegative | None = None  # and until they do; the friction if not given
+    rolling_friction: NotNegative = 0.0  # [m]; the torque is at most this times the normal force
+    tangential_restitution: TangentialRestitution = 0.0  # of impacts that stick, Walton's beta_0
+
+    @model_validator(mode="after")
+    def _static_is_not_below(self) -> World:
+        check_static(self.friction, self.static_friction)
+        return self
+
+    @property
+    def surface(self) -> dict[str, float]:
+        """The surface of the walls, and of what does not say."""
+        static = self.friction if self.static_friction is None else self.static_friction
+        names = "restitution", "friction", "rolling_friction", "tangential_restitution"
+        return {**{name: getattr(self, name) for name in names}, "static_friction": static}
 
     @property
     def period(self) -> tuple[float, float, float]:

@@ -16,12 +16,13 @@ from particlesim.geometry.shape_table import stack_shapes
 from particlesim.geometry.shapes import CATALOGUE, Shape, half_space
 from particlesim.model.bodies import make_particles
 from particlesim.model.domain import make_domain, make_walls, wall_normals
-from particlesim.model.materials import Material, contact_laws
+from particlesim.model.materials import Material, PairLaw, contact_laws
 from particlesim.model.overlap import separation_of, touching_half_spaces, touching_pairs
 from particlesim.model.system import Model, System, make_system
 from particlesim.scene import Scene
 from particlesim.scene.file import SceneError
 from particlesim.scene.groups import FixedSize, Group, ListPlacement, MeshShape, Turn
+from particlesim.scene.surface import WALLS
 from particlesim.setup.initial_motion import random_quaternions, set_in_motion
 from particlesim.setup.obstacles import Obstacle, obstruct
 from particlesim.setup.placement import positions
@@ -52,7 +53,7 @@ def build(scene: Scene, obstacles: Sequence[Obstacle] = ()) -> Model:
     _check_sizes(scene, domain[0], particles)
     _check_volume(scene, domain[0], shapes, particles)
     particles["orientation"] = _orientations(scene, shapes, particles, randoms)
-    model = assemble(shapes, particles, domain, materials_of(scene), obstacles)
+    model = assemble(shapes, particles, domain, materials_of(scene), obstacles, pair_laws_of(scene))
     crowd = Crowd(*(np.ascontiguousarray(particles[name]) for name in ("shape_row", "group", "scale", "radius")))
     particles = model.particles
     particles["position"] = positions(
@@ -69,6 +70,7 @@ def assemble(
     domain: np.ndarray,
     materials: list[Material],
     obstacles: Sequence[Obstacle] = (),
+    pair_laws: Sequence[PairLaw] = (),
 ) -> Model:
     """A model of particles (n,) BODY in a domain, (1,) DOMAIN, with its walls and other obstacles.
 
@@ -84,7 +86,7 @@ def assemble(
         particles,
         others.bounded,
         half_spaces,
-        law=contact_laws(materials),
+        law=contact_laws(materials, pair_laws),
         motion=others.motion,
         domain=domain,
     )
@@ -93,9 +95,15 @@ def assemble(
 
 def materials_of(scene: Scene) -> list[Material]:
     """The material of the walls, then that of each group."""
-    usual = scene.world.restitution
-    groups = (usual if group.restitution is None else group.restitution for group in scene.particles)
-    return [Material(restitution) for restitution in (usual, *groups)]
+    usual = scene.world.surface
+    return [Material(**usual), *(Material(**{**usual, **group.surface}) for group in scene.particles)]
+
+
+def pair_laws_of(scene: Scene) -> list[PairLaw]:
+    """What the scene says of contacts between two of the materials."""
+    row = {WALLS: 0, **{group.name: g for g, group in enumerate(scene.particles, 1) if group.name is not None}}
+    between = ((contact.between, contact.surface) for contact in scene.contact)
+    return [PairLaw(row[a], row[b], values) for (a, b), values in between]
 
 
 def build_domain(scene: Scene) -> np.ndarray:

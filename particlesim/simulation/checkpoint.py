@@ -20,7 +20,7 @@ from particlesim.model.system import Model, System
 from particlesim.scene import Scene
 from particlesim.scene.file import SceneError, parse_scene
 
-_FORMAT = 1
+_FORMAT = 2
 
 
 class CheckpointError(ValueError):
