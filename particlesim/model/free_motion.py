@@ -24,23 +24,13 @@ from particlesim.core.math3d import (
     to_quat,
     to_vec3,
 )
+from particlesim.core.quadrature import STAGES, WEIGHTS
 from particlesim.model.bodies import DYNAMIC, EQUAL_MOMENTS, KINEMATIC, angular_velocity
 from particlesim.model.prescribed_motion import NO_SWING, swing_shift
 
 # An asymmetric body turns by at most this angle [rad] in one stage of the quadrature, whose error falls as its
 # seventh power: about 1e-13 rad.
 _MAX_TURN = 0.05
-
-# Gauss-Legendre quadrature with three stages, order 6 (E. Hairer, C. Lubich, G. Wanner, Geometric Numerical
-# Integration, 2nd ed., II.1.3, table 1.2). Such methods keep quadratic invariants (IV.2, theorem 2.1): here the
-# energy and the length of the angular momentum.
-_S = math.sqrt(15.0)
-_GAUSS = (
-    (5.0 / 36.0, 2.0 / 9.0 - _S / 15.0, 5.0 / 36.0 - _S / 30.0),
-    (5.0 / 36.0 + _S / 24.0, 2.0 / 9.0, 5.0 / 36.0 - _S / 24.0),
-    (5.0 / 36.0 + _S / 30.0, 2.0 / 9.0 + _S / 15.0, 5.0 / 36.0),
-)
-_WEIGHTS = (5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0)
 
 
 @kernel
@@ -106,16 +96,19 @@ def _stage(q, m, rates_q, rates_m, weights, time):
 
 @kernel
 def _asymmetric_turn(orientation, body_momentum, principal_inertia, time):
-    """Orientation and angular momentum in body axes after a short ``time``, by one step of Gauss-Legendre."""
+    """Orientation and angular momentum in body axes after a short ``time``, by one step of Gauss-Legendre.
+
+    It keeps the energy and the length of the angular momentum, which are quadratic.
+    """
     inverse = (1.0 / principal_inertia[0], 1.0 / principal_inertia[1], 1.0 / principal_inertia[2])
     q0, m0 = _rates(orientation, body_momentum, inverse)
     rates_q, rates_m = (q0, q0, q0), (m0, m0, m0)
     # The stages are implicit: iterated until they repeat. Each round gains a factor of the angle turned.
     limit = 1e-16 * norm(body_momentum) * norm(m0)
     for _ in range(40):
-        qa, ma = _stage(orientation, body_momentum, rates_q, rates_m, _GAUSS[0], time)
-        qb, mb = _stage(orientation, body_momentum, rates_q, rates_m, _GAUSS[1], time)
-        qc, mc = _stage(orientation, body_momentum, rates_q, rates_m, _GAUSS[2], time)
+        qa, ma = _stage(orientation, body_momentum, rates_q, rates_m, STAGES[0], time)
+        qb, mb = _stage(orientation, body_momentum, rates_q, rates_m, STAGES[1], time)
+        qc, mc = _stage(orientation, body_momentum, rates_q, rates_m, STAGES[2], time)
         qa, ma = _rates(qa, ma, inverse)
         qb, mb = _rates(qb, mb, inverse)
         qc, mc = _rates(qc, mc, inverse)
@@ -124,7 +117,7 @@ def _asymmetric_turn(orientation, body_momentum, principal_inertia, time):
         rates_q, rates_m = (qa, qb, qc), (ma, mb, mc)
         if change * norm(body_momentum) <= limit and change_q * time <= 1e-16:
             break
-    orientation, body_momentum = _stage(orientation, body_momentum, rates_q, rates_m, _WEIGHTS, time)
+    orientation, body_momentum = _stage(orientation, body_momentum, rates_q, rates_m, WEIGHTS, time)
     return quat_normalize(orientation), body_momentum
 
 
