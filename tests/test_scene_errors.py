@@ -17,7 +17,7 @@ BOUNDARY = "must be 'wall', 'periodic' or 'open', or a list of 3 of them"
 TURN = "[w, x, y, z] (a quaternion), or { axis = [x, y, z], angle = degrees }"
 COLOUR = "must be 'by_shape', 'by_group', 'by_speed', 'by_height', 'by_size', 'by_impacts', a colour name such as 'steelblue', or '#rrggbb'"
 ROWS = (
-    "must be true, false or a list of 'time', 'particles', 'impacts', 'energy change', 'temperature', 'pressure', "
+    "must be true, false or a list of 'time', 'particles', 'impacts', 'energy change', 'dissipation', 'temperature', 'pressure', "
     "'speed', 'pairs tested' or 'broad phases'"
 )
 TWO = "must be the names of two groups, or of one and 'walls', such as ['a', 'b']"

@@ -3,7 +3,7 @@
 import numpy as np
 
 from particlesim.core.constants import MAX_MANIFOLD
-from particlesim.dynamics.contact.impact import CONTACT, find_contact
+from particlesim.dynamics.contact.contact import CONTACT, find_contact
 from particlesim.model.overlap import separation_of
 from particlesim.simulation.simulation import Simulation
 from tests.kernels import callable_from_python

@@ -96,6 +96,7 @@ def print_summary(summary: Summary, path: Path) -> None:
         ("simulated", f"{summary.simulated_seconds:g} s"),
         ("impacts", f"{summary.impacts:,}"),
         ("worst energy change", f"{summary.worst_energy_drift:.1e} of all of it"),
+        *((f"lost by {cause}", f"{share:.3g} of all of it") for cause, share in summary.dissipated.items() if share),
         ("momentum not accounted for", f"{summary.momentum_error:.1e}"),
         ("largest overlap", f"{summary.largest_overlap:.1e} m"),
     ]

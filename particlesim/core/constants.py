@@ -15,5 +15,9 @@ OPEN = 2
 # The six walls in the order of the ledger's wall impulses.
 WALL_NAMES = ("-x", "+x", "-y", "+y", "-z", "+z")
 
+# What takes energy, in the order of the ledger: impacts by their restitution, friction and rolling friction, and what
+# comes to rest.
+DISSIPATION = ("restitution", "friction", "rolling", "rest")
+
 # The most points a contact manifold keeps, as two squares across each other have.
 MAX_MANIFOLD = 8

@@ -19,7 +19,7 @@ import numpy as np
 from particlesim.core.parallel import ThreadTeam
 from particlesim.dynamics.advance import advance, sum_speeds, time_within_skins
 from particlesim.dynamics.ccd.swept_bounds import BOUND
-from particlesim.dynamics.contact.impact import ACCUMULATED, IMPACTS, VIRIAL, WALLS
+from particlesim.dynamics.contact.booking import IMPACTS, LOST, SHEAR, VIRIAL, WALLS, columns_needed
 from particlesim.dynamics.contact.resting import Borne, RestingContacts, forget_clearance
 from particlesim.dynamics.events.collision_prediction import Predicted, bound_paths, predict, predict_across
 from particlesim.dynamics.events.event_queue import run_islands
@@ -84,7 +84,7 @@ class Solver:
         _set_tolerances(system)
         self._resting = RestingContacts(system)
         self._clock = new_clocks(len(system.body))
-        self._accumulator = np.zeros((system.particles, ACCUMULATED if len(system.body) > system.bounded else WALLS))
+        self._accumulator = np.zeros((system.particles, columns_needed(system)))
         self._bound = np.zeros(system.bounded, dtype=BOUND)  # scratch, by place
         self._segments = no_segments()  # scratch, with room for those of the substeps so far
         self._periodic_room = _periodic_room(system)
@@ -334,7 +334,9 @@ class Solver:
         counts.each[disturbed] += self._clock["impacts"][disturbed]
         counts.impacts += int(total[IMPACTS])
         counts.virial += float(total[VIRIAL]) + borne.virial
-        counts.wall_impulse[: len(total) - WALLS] += total[WALLS:]
+        columns = slice(WALLS, LOST), slice(LOST, SHEAR), slice(SHEAR, None)
+        for sums, place in zip((counts.wall_impulse, counts.dissipated, counts.wall_shear), columns, strict=True):
+            sums.flat[: len(total[place])] += total[place]
         counts.wall_impulse += borne.wall_impulse
         counts.unresolved += unfinished > 0 or borne.unresolved
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from particlesim.core.constants import DISSIPATION
 from particlesim.core.records import record
 from particlesim.dynamics.neighbour_list import NeighbourList, Order
 
@@ -26,6 +27,8 @@ class Counts:
     impacts: int = 0
     virial: float = 0.0  # sum of r_ij . impulse over pair impacts [J s]
     wall_impulse: np.ndarray = field(default_factory=lambda: np.zeros(6))  # outward, on each wall [N s]
+    wall_shear: np.ndarray = field(default_factory=lambda: np.zeros((6, 3)))  # and along it, a vector
+    dissipated: np.ndarray = field(default_factory=lambda: np.zeros(len(DISSIPATION)))  # by cause [J]
     pairs_tested: int = 0  # boxes compared by the broad phase
     candidate_pairs: int = 0  # pairs it found
     unresolved: int = 0  # substeps in which more happened than was worked through (see MAX_IMPACTS)

@@ -22,7 +22,6 @@ from particlesim.jobs.frame_source import (
     tell,
 )
 from particlesim.jobs.summary import Summary
-from particlesim.model.materials import contact_laws
 from particlesim.rendering import Renderer, write_image, write_movie
 from particlesim.rendering.gl import platform
 from particlesim.rendering.hud.history import History
@@ -30,7 +29,7 @@ from particlesim.rendering.look import look_of
 from particlesim.rendering.shading.colour import encoded
 from particlesim.rendering.video.fade import faded, strength
 from particlesim.scene import Scene
-from particlesim.setup.build import materials_of, pair_laws_of
+from particlesim.setup.build import contact_laws_of
 from particlesim.trajectory.frames import Frame, Header
 from particlesim.trajectory.gsd_file import Trajectory, TrajectoryWriter
 
@@ -219,7 +218,7 @@ class MovieJob:
 
 
 def _summary(scene: Scene, header: Header) -> Summary:
-    laws = contact_laws(materials_of(scene), pair_laws_of(scene))
+    laws = contact_laws_of(scene)
     elastic = bool((laws["restitution"] == 1.0).all() and (laws["friction"] == 0.0).all())
     return Summary(float(header.mass.sum()), scene.world.gravity, elastic)
 

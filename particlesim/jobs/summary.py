@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from particlesim.core.constants import DISSIPATION
 from particlesim.trajectory.frames import Frame, Ledger
 
 
@@ -72,6 +73,14 @@ class Summary:
         """
         return self._of_all(self._largest_change if self.elastic else self._largest_gain)
 
+    @property
+    def dissipated(self) -> dict[str, float]:
+        """What each cause took of the energy up to the last frame, as a fraction of all; empty if it is not known."""
+        if not (self._first and self._last) or self._first.dissipated is None or self._last.dissipated is None:
+            return {}
+        taken = self._last.dissipated - self._first.dissipated
+        return {cause: self._of_all(float(energy)) for cause, energy in zip(DISSIPATION, taken, strict=True)}
+
     def _of_all(self, energy: float) -> float:
         scale = max(self._largest_kinetic, self._first.energy if self._first else 0.0)
         return energy / scale if scale else 0.0
@@ -82,8 +91,7 @@ class Summary:
         if not (self._first and self._last and self._largest_kinetic):
             return 0.0
         first, last = self._first, self._last
-        given = last.wall_impulse - first.wall_impulse
-        to_walls = np.array([given[1] - given[0], given[3] - given[2], given[5] - given[4]])
+        to_walls = last.given_to_walls - first.given_to_walls
         fallen = self._mass * self._gravity * (last.time - first.time)
         error = last.momentum - first.momentum + to_walls - fallen
         return float(np.linalg.norm(error) / np.sqrt(2.0 * self._mass * self._largest_kinetic))

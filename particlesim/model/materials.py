@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -21,12 +20,13 @@ CONTACT_LAW = record(
     ]
 )
 
-# What each field of a material may be.
+# What each field of a material may be. Friction without end would be 0 times infinity where nothing presses; 1e30 is
+# as good.
 _BOUNDS = {
     "restitution": (0.0, 1.0),
-    "friction": (0.0, math.inf),
-    "static_friction": (0.0, math.inf),
-    "rolling_friction": (0.0, math.inf),
+    "friction": (0.0, 1e30),
+    "static_friction": (0.0, 1e30),
+    "rolling_friction": (0.0, 1e30),
     "tangential_restitution": (-1.0, 1.0),
 }
 

@@ -159,7 +159,7 @@ class Movie(Model):
 
 
 _Row = Literal[
-    "time", "particles", "impacts", "energy change",
+    "time", "particles", "impacts", "energy change", "dissipation",
     "temperature", "pressure", "speed", "pairs tested", "broad phases",
 ]  # fmt: skip
 _ROWS = get_args(_Row)

@@ -99,6 +99,11 @@ def materials_of(scene: Scene) -> list[Material]:
     return [Material(**usual), *(Material(**{**usual, **group.surface}) for group in scene.particles)]
 
 
+def contact_laws_of(scene: Scene) -> np.ndarray:
+    """The contact laws of a scene's walls and groups, (m, m) CONTACT_LAW."""
+    return contact_laws(materials_of(scene), pair_laws_of(scene))
+
+
 def pair_laws_of(scene: Scene) -> list[PairLaw]:
     """What the scene says of contacts between two of the materials."""
     row = {WALLS: 0, **{group.name: g for g, group in enumerate(scene.particles, 1) if group.name is not None}}

@@ -200,6 +200,8 @@ class Simulation:
             unresolved=counts.unresolved,
             virial=counts.virial,
             wall_impulse=counts.wall_impulse.copy(),
+            dissipated=counts.dissipated.copy(),
+            wall_shear=counts.wall_shear.copy(),
         )
 
     def largest_overlap(self) -> float:

@@ -31,11 +31,19 @@ class Ledger:
     virial: float  # sum of r_ij . impulse over pair impacts [J s]
     wall_impulse: np.ndarray  # (6,) given to the walls -x, +x, -y, +y, -z, +z along their outward normals [N s]
     largest_overlap: float | None = None  # of two particles, or of one and a wall [m]; only recorded frames have it
+    dissipated: np.ndarray | None = None  # (4,) by the causes in DISSIPATION [J]; older files do not have it
+    wall_shear: np.ndarray | None = None  # (6, 3) given to the walls across their normals [N s]; nor this
 
     @property
     def kinetic(self) -> float:
         """Translational and rotational kinetic energy [J]."""
         return self.kinetic_translational + self.kinetic_rotational
+
+    @property
+    def given_to_walls(self) -> np.ndarray:
+        """The impulse given to all walls, (3,) [N s]."""
+        pressed = self.wall_impulse[1::2] - self.wall_impulse[::2]
+        return pressed if self.wall_shear is None else pressed + self.wall_shear.sum(axis=0)
 
     @property
     def energy(self) -> float:

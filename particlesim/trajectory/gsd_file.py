@@ -20,7 +20,7 @@ import gsd.hoomd
 import numpy as np
 
 from particlesim.core.atomic_write import atomic_write
-from particlesim.core.constants import CAPSULE, SPHERE
+from particlesim.core.constants import CAPSULE, DISSIPATION, SPHERE, WALL_NAMES
 from particlesim.core.rotations import conjugates, quaternion_products
 from particlesim.geometry.shapes import Shape, capsule, hull, sphere
 from particlesim.scene import Scene
@@ -55,8 +55,14 @@ _DEFAULTS: dict[str, tuple[float, ...]] = {
 # How far the square of a quaternion's length may be from 1: rounding to single precision leaves 1e-6.
 _UNIT = 1e-3
 
-# How many numbers the vectors of a ledger are.
-_VECTORS = {"momentum": 3, "angular_momentum": 3, "wall_impulse": 6}
+# What the arrays of a ledger are.
+_SHAPES: dict[str, tuple[int, ...]] = {
+    "momentum": (3,),
+    "angular_momentum": (3,),
+    "wall_impulse": (len(WALL_NAMES),),
+    "dissipated": (len(DISSIPATION),),
+    "wall_shear": (len(WALL_NAMES), 3),
+}
 
 
 class TrajectoryWriter:
@@ -299,8 +305,8 @@ def _read_ledger(chunks: Chunks, k: int) -> Ledger:
 
 def _typed(value: np.ndarray, field: Field[Any]) -> Any:
     """The value of a field as its type says. ValueError if it is not as many numbers."""
-    if field.name in _VECTORS:
-        return value.astype(np.float64).reshape(_VECTORS[field.name])
+    if field.name in _SHAPES:
+        return value.astype(np.float64).reshape(_SHAPES[field.name])
     (number,) = value.reshape(-1)
     return int(number) if field.type == "int" else float(number)
 

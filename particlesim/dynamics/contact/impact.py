@@ -16,43 +16,19 @@ import numpy as np
 from particlesim.core.constants import MAX_MANIFOLD
 from particlesim.core.jit import kernel
 from particlesim.core.math3d import add, axpy, cross, dot, load_vec3, norm, scale, set_vec3, sub, to_vec3
-from particlesim.core.records import record
-from particlesim.dynamics.contact.law import rest_threshold, restitution_of, tangent_of
+from particlesim.dynamics.contact.booking import IMPACTS, book_contact
+from particlesim.dynamics.contact.contact import CONTACT, find_contact, inverse_mass_at, normal_velocity_at
+from particlesim.dynamics.contact.law import has_friction, rest_threshold, restitution_of
+from particlesim.dynamics.contact.rough_impact import rough_impulse
 from particlesim.dynamics.settings import APPROACH_TOLERANCE, MAX_MANIFOLD_IMPULSES
-from particlesim.geometry.narrow_phase.pair import pair_contact
-from particlesim.model.bodies import (
-    BODY,
-    DYNAMIC,
-    angular_velocity,
-    angular_velocity_change,
-    per_mass,
-    placed,
-)
-from particlesim.model.domain import nearest_image
+from particlesim.model.bodies import BODY, DYNAMIC, angular_velocity, angular_velocity_change, per_mass
 
 # What became of contacts: they did not approach; they approached fast; slowly, and rebounded in full until they come to
 # rest; or slowly with both bodies resting, which is left to the next substep.
 NOTHING, STRUCK, REBOUNDED, LEFT = 0, 1, 2, 3
 
-# Columns of an island's accumulator: impacts, the virial, then the impulse on each wall.
-IMPACTS, VIRIAL, WALLS = 0, 1, 2
-ACCUMULATED = 8
-
 # Contacts and bodies of one moment; more that are simultaneous are resolved one after the other.
 MAX_CONTACTS = 64
-
-CONTACT = record(
-    [
-        ("normal", "f8", (3,)),  # from a to b
-        ("tangent", "f8", (3,)),  # with normal x tangent the basis in which friction acts
-        ("offset", "f8", (3,)),  # b's position from a's [m]
-        ("count", "i8"),  # of the points
-        ("impulse", "f8"),  # of the present round [N s]
-        ("resolved", "i8"),  # whether it has had any
-        ("a", "i8"),  # actors
-        ("b", "i8"),
-    ]
-)
 
 
 class Moment(NamedTuple):
@@ -82,51 +58,13 @@ def new_moment():
     )
 
 
-# ---- one impulse ---------------------------------------------------------------------------------------------------
-
-
-@kernel
-def _point_velocity(b, lever_arm):
-    """Velocity of the point of a body at ``lever_arm`` from its position."""
-    return add(to_vec3(b.velocity), cross(angular_velocity(b), lever_arm))
-
-
-@kernel
-def _inverse_mass_at(b, lever_arm, normal):
-    """How much speed along ``normal`` a unit impulse along it gives the point at ``lever_arm`` [1/kg].
-
-    1/m + n . ((I^-1 (r x n)) x r) (D. Baraff, SIGGRAPH 1997 course notes, Rigid Body Simulation II, eq. 8-18)
-    """
-    lever = cross(lever_arm, normal)
-    return per_mass(b, dot(normal, normal)) + dot(lever, angular_velocity_change(b, lever))
-
-
-@kernel
-def normal_velocity_at(a, b, lever_arm, offset, normal):
-    """Normal velocity of two bodies at a point (negative: they approach), and the sum of the speeds there [m/s]."""
-    of_a, of_b = _point_velocity(a, lever_arm), _point_velocity(b, sub(lever_arm, offset))
-    return -dot(of_a, normal) + dot(of_b, normal), norm(of_a) + norm(of_b)
+# ---- contacts of one moment ----------------------------------------------------------------------------------------
 
 
 @kernel
 def is_resting(b):
     """Whether resting contacts carry a body through the present substep; what cannot be pushed always rests."""
     return b.kind != DYNAMIC or b.resting != 0
-
-
-# ---- contacts of one moment ----------------------------------------------------------------------------------------
-
-
-@kernel
-def find_contact(system, a, b, contact, points):
-    """Fill in the contact of two bodies where they are now, and its points; returns their separation."""
-    offset = nearest_image(sub(to_vec3(b.position), to_vec3(a.position)), system.domain[0].period)
-    separation, normal, count = pair_contact(system.shapes, placed(a), placed(b), offset, points)
-    set_vec3(contact.normal, normal)
-    set_vec3(contact.tangent, tangent_of(normal))
-    set_vec3(contact.offset, offset)
-    contact.count = count
-    return separation
 
 
 @kernel
@@ -184,6 +122,14 @@ def _add_push(push, impulse, lever_arm, normal):
 
 
 @kernel
+def _add(push, impulse, angular_impulse):
+    """Add an impulse and an angular impulse to what a body gets in the present round."""
+    for axis in range(3):
+        push[axis] += impulse[axis]
+        push[3 + axis] += angular_impulse[axis]
+
+
+@kernel
 def _common_factor(moment, size, gain):
     """The factor on all impulses that leaves the energy which the restitutions say.
 
@@ -209,14 +155,23 @@ def _propose(system, moment, c, leave_slow):
     point, speed = _point_to_resolve(system.domain[0].rest_speed, a, b, contact, moment.points[c])
     if speed >= 0.0:
         return NOTHING, 0.0
-    stop = -speed / (_inverse_mass_at(a, point, normal) + _inverse_mass_at(b, sub(point, offset), normal))
     what, factor = _rebound(system, a, b, -speed)
     if what == LEFT or (leave_slow and what != STRUCK):
         return NOTHING, 0.0
+    if has_friction(system, a, b):
+        impulse, turned_a, turned_b, energy = rough_impulse(
+            system, a, b, contact, moment.points[c], point, factor - 1.0
+        )
+        _add(moment.push[contact.a], scale(impulse, -1.0), turned_a)
+        _add(moment.push[contact.b], impulse, turned_b)
+        return what, energy
+    stop = -speed / (inverse_mass_at(a, point, normal) + inverse_mass_at(b, sub(point, offset), normal))
     contact.impulse = factor * stop
+    energy = factor * factor * stop * -speed
+    contact.lost[0] = 0.5 * (2.0 / factor - 1.0) * energy
     _add_push(moment.push[contact.a], -contact.impulse, point, normal)
     _add_push(moment.push[contact.b], contact.impulse, sub(point, offset), normal)
-    return what, factor * factor * stop * -speed
+    return what, energy
 
 
 @kernel
@@ -230,23 +185,13 @@ def _apply(moment, size, factor):
 
 
 @kernel
-def book_impulse(accumulator, b, impulse, offset, normal):
-    """Book an impulse that body ``b`` got from a particle: on the virial, or on the wall that it is."""
-    if b.kind == DYNAMIC:
-        accumulator[VIRIAL] += impulse * dot(offset, normal)
-    elif b.wall >= 0:
-        accumulator[WALLS + b.wall] += impulse
-
-
-@kernel
 def _book_round(moment, count, factor, accumulator):
     """Book the impulses of a round."""
     for c in range(count):
         contact = moment.contact[c]
         if contact.impulse > 0.0:
             contact.resolved = 1
-            offset, normal = to_vec3(contact.offset), to_vec3(contact.normal)
-            book_impulse(accumulator, moment.actor[contact.b], factor * contact.impulse, offset, normal)
+            book_contact(accumulator, moment.actor[contact.b], contact, factor)
 
 
 @kernel
@@ -273,6 +218,8 @@ def resolve_contacts(system, moment, count, size, leave_slow, accumulator):
         contact = moment.contact[c]
         find_contact(system, moment.actor[contact.a], moment.actor[contact.b], contact, moment.points[c])
         contact.resolved = 0
+        set_vec3(contact.shear, (0.0, 0.0, 0.0))
+        set_vec3(contact.lost, (0.0, 0.0, 0.0))
     outcome = NOTHING
     for _ in range(MAX_MANIFOLD_IMPULSES):
         moment.push[:size] = 0.0

@@ -18,6 +18,12 @@ def restitution_of(system, a, b):
 
 
 @kernel
+def has_friction(system, a, b):
+    """Whether two bodies rub against each other where they touch."""
+    return system.law[a.material, b.material].friction > 0.0
+
+
+@kernel
 def rest_threshold(system, a, b):
     """Normal speed below which an impact under gravity ends in rest (see RESTITUTION_THRESHOLD_HEIGHT) [m/s]."""
     gravity = norm(to_vec3(system.domain[0].gravity))

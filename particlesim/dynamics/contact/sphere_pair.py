@@ -1,4 +1,4 @@
-"""Two spheres that strike each other and nothing else: most islands in a gas of spheres.
+"""Two smooth spheres that strike each other and nothing else: most islands in a gas of spheres.
 
 They need no event queue, as there is one event. What it does to them is worked out here on plain numbers, by the
 formulas of ``impact.resolve_contacts`` in the same order: the result is the same to the last bit. Without it all
@@ -12,8 +12,8 @@ import math
 from particlesim.core.jit import kernel
 from particlesim.core.math3d import add, axpy, cross, dot, norm, scale, set_vec3, sub, to_vec3
 from particlesim.dynamics.ccd.time_of_impact import sphere_half_space_impact
-from particlesim.dynamics.contact.impact import IMPACTS, VIRIAL
-from particlesim.dynamics.contact.law import restitution_of
+from particlesim.dynamics.contact.booking import IMPACTS, LOST, VIRIAL
+from particlesim.dynamics.contact.law import has_friction, restitution_of
 from particlesim.dynamics.events.paths import UNCHAINED, UNDISTURBED, write_segment
 from particlesim.dynamics.settings import APPROACH_TOLERANCE
 from particlesim.geometry.support import half_space_plane, is_sphere
@@ -27,14 +27,14 @@ _LEFT_APPROACH = 1e-3
 
 @kernel
 def strike_alone(system, predicted, i, j):
-    """Whether an island of i and j is two spheres, without gravity and obstacles, with one impact on their paths."""
+    """Whether an island of i and j is two spheres, without friction, gravity and obstacles, with one impact."""
     first, pairs = predicted.first, predicted.pair
     k = first[i]
     only_impact = k >= 0 and pairs[k, 1] == j and (k + 1 == len(pairs) or pairs[k + 1, 0] != i) and first[j] < 0
     gravity, shapes = to_vec3(system.domain[0].gravity), system.shapes
     free = dot(gravity, gravity) == 0.0 and system.bounded == system.particles and len(system.motion) == 0
     spheres = is_sphere(shapes, system.body[i].shape_row) and is_sphere(shapes, system.body[j].shape_row)
-    return only_impact and free and spheres
+    return only_impact and free and spheres and not has_friction(system, system.body[i], system.body[j])
 
 
 @kernel
@@ -99,7 +99,8 @@ def resolve_sphere_pair(system, clock, i, j, interval, accumulator, segment):
     if speed >= -(APPROACH_TOLERANCE * (norm(of_a) + norm(of_b)) + system.domain[0].rest_speed):
         return False
     inverse_mass = _inverse_mass_at(a, q_a, arm_a, normal) + _inverse_mass_at(b, q_b, arm_b, normal)
-    impulse = (1.0 + restitution_of(system, a, b)) * (-speed / inverse_mass)
+    restitution = restitution_of(system, a, b)
+    impulse = (1.0 + restitution) * (-speed / inverse_mass)
     v_a = axpy(v_a, scale(normal, -impulse), per_mass(a, 1.0))
     v_b = axpy(v_b, scale(normal, impulse), per_mass(b, 1.0))
     if (
@@ -114,4 +115,6 @@ def resolve_sphere_pair(system, clock, i, j, interval, accumulator, segment):
     _record(b, clock[j], j, time, (x_b, q_b, v_b, momentum_b), segment[2:4])
     accumulator[VIRIAL] += impulse * dot(offset, normal)
     accumulator[IMPACTS] += 1
+    if len(accumulator) > LOST:
+        accumulator[LOST] -= 0.5 * (1.0 - restitution) * impulse * speed
     return True

@@ -11,7 +11,8 @@ from particlesim.core.constants import MAX_MANIFOLD
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import dot, grow_records, set_vec3, to_vec3
 from particlesim.dynamics.ccd.pair_impact import next_impact
-from particlesim.dynamics.contact.impact import MAX_CONTACTS, NOTHING, STRUCK, WALLS, new_moment, resolve_contacts
+from particlesim.dynamics.contact.booking import WALLS
+from particlesim.dynamics.contact.impact import MAX_CONTACTS, NOTHING, STRUCK, new_moment, resolve_contacts
 from particlesim.dynamics.contact.sphere_pair import resolve_sphere_pair, strike_alone
 from particlesim.dynamics.events.paths import SEGMENT, UNCHAINED, UNDISTURBED, write_segment
 from particlesim.dynamics.settings import MAX_IMPACTS, MAX_SLOW_IMPACTS, SIMULTANEOUS

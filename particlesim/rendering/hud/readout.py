@@ -9,10 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.broad_phase import METHODS
+from particlesim.core.constants import DISSIPATION
 from particlesim.rendering.hud.history import History
 from particlesim.rendering.hud.panel import Panel, Style
 from particlesim.rendering.look import Look
 from particlesim.scene import Scene
+from particlesim.setup.build import contact_laws_of
 from particlesim.trajectory.frame_aabb import frame_boxes
 from particlesim.trajectory.frames import Frame, Ledger
 
@@ -84,12 +86,27 @@ def _broad_phases(look: Look, frame: Frame, history: History) -> Iterator[Row]:
         yield Row(f"{name} tests", f"{_tested(look, frame, method):,}", longest)
 
 
+def _dissipation(look: Look, frame: Frame, history: History) -> Iterator[Row]:
+    """What each cause that there can be in the scene took of the energy."""
+    if frame.ledger is None or frame.ledger.dissipated is None or look.start is None:
+        return
+    laws = contact_laws_of(look.scene)
+    soft, weight = (laws["restitution"] < 1.0).any(), any(look.scene.world.gravity)
+    rough, rolling = ((laws[name] > 0.0).any() for name in ("friction", "rolling_friction"))
+    scale = _all_energy(look.start)
+    there = soft, rough, rough and rolling, soft and weight
+    for cause, possible, energy in zip(DISSIPATION, there, frame.ledger.dissipated.tolist(), strict=True):
+        if possible:
+            yield Row(f"lost by {cause}", f"{100.0 * energy / scale if scale else 0.0:.1f} %", "100.0 %")
+
+
 # Rows by the names that a scene lists them under.
 _ROWS: dict[str, Callable[[Look, Frame, History], Iterator[Row]]] = {
     "time": _time,
     "particles": _particles,
     "impacts": _impacts,
     "energy change": _energy_change,
+    "dissipation": _dissipation,
     "temperature": _temperature,
     "pressure": _pressure,
     "speed": _speed,
@@ -127,8 +144,13 @@ def readout_panel(rows: list[Row], style: Style) -> Panel:
 
 def energy_change(now: Ledger, start: Ledger) -> float:
     """Change of the total energy since ``start``, relative to the kinetic energy and depth of potential there."""
-    scale = start.kinetic + abs(start.potential) or now.kinetic + abs(now.potential)
+    scale = _all_energy(start) or _all_energy(now)
     return (now.energy - start.energy) / scale if scale else 0.0
+
+
+def _all_energy(ledger: Ledger) -> float:
+    """Kinetic energy and depth of the potential [J]."""
+    return ledger.kinetic + abs(ledger.potential)
 
 
 def pressure(scene: Scene, window: Sequence[Ledger]) -> float | None:
