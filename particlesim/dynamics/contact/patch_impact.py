@@ -72,6 +72,13 @@ def _product(inverse_mass, impulse, other):
 
 
 @kernel
+def _combine(out, factor, one, other_factor, other):
+    """out = factor * one + other_factor * other; ``out`` may be one of them."""
+    for row in range(len(out)):
+        out[row] = factor * one[row] + other_factor * other[row]
+
+
+@kernel
 def _rub_point(inverse_mass, before, impulse, k, edge, share):
     """Let friction at point ``k``, at most ``edge``, end the sliding there, or oppose it; the change of the impulse.
 
@@ -142,9 +149,8 @@ def _share_evenly(inverse_mass, velocity, impulse):
         approach -= velocity[i]
         for j in range(0, len(impulse), 3):
             response += inverse_mass[i, j]
-    impulse[:] = 0.0
-    for i in range(0, len(impulse), 3):
-        impulse[i] = max(0.0, approach / response)
+    for row in range(len(impulse)):
+        impulse[row] = max(0.0, approach / response) if row % 3 == 0 else 0.0
 
 
 @kernel
@@ -170,7 +176,7 @@ def _coulomb_impulses(inverse_mass, velocity, restitution, friction, impulse):
     if taken <= (1.0 - PATCH_ACCEPTED) * square:
         return -1.0
     if taken < square:
-        impulse *= taken / square
+        _combine(impulse, taken / square, impulse, 0.0, impulse)
     after = np.empty(len(impulse))
     pressing = 0.0
     for row in range(len(impulse)):
@@ -178,9 +184,10 @@ def _coulomb_impulses(inverse_mass, velocity, restitution, friction, impulse):
         if row % 3 == 0:
             pressing -= 0.5 * impulse[row] * (velocity[row] + after[row])
     if restitution > 0.0:
-        again = restitution * impulse
+        again = np.empty(len(impulse))
+        _combine(again, restitution, impulse, 0.0, impulse)
         _rub(inverse_mass, after, friction, again)
-        impulse += again
+        _combine(impulse, 1.0, impulse, 1.0, again)
     lost = max(-_energy(inverse_mass, velocity, impulse), 0.0)
     return lost - min(max((1.0 - restitution * restitution) * pressing, 0.0), lost)
 
@@ -195,9 +202,9 @@ def _give_back(inverse_mass, velocity, law, impulse, rubbed):
     As far as all points stay within their cones and none approaches, and no more energy comes back than the square of
     that of what friction took.
     """
-    back, after = impulse.copy(), np.empty(len(impulse))
-    back[::3] = 0.0
+    back, after = np.empty(len(impulse)), np.empty(len(impulse))
     for row in range(len(impulse)):
+        back[row] = 0.0 if row % 3 == 0 else impulse[row]
         after[row] = _velocity_at(inverse_mass, velocity, impulse, row)
     square = _product(inverse_mass, back, back)
     factor = law.tangential_restitution
@@ -210,7 +217,7 @@ def _give_back(inverse_mass, velocity, law, impulse, rubbed):
         if factor * closing > max(after[n], 0.0):
             factor = max(after[n], 0.0) / closing
     before = _energy(inverse_mass, velocity, impulse)
-    impulse += factor * back
+    _combine(impulse, 1.0, impulse, factor, back)
     return _energy(inverse_mass, velocity, impulse) - before
 
 
@@ -218,19 +225,20 @@ def _give_back(inverse_mass, velocity, law, impulse, rubbed):
 def _smooth(inverse_mass, velocity, restitution, law, impulse):
     """Fill in the impulses of a patch whose tangential restitution is below 0: between smooth and rougher ones."""
     share = 1.0 + law.tangential_restitution
-    _coulomb_impulses(inverse_mass, velocity, restitution, 0.0, impulse)
-    if share <= 0.0:
-        return 0.0
-    rough = np.empty(len(impulse))
-    rubbed = _coulomb_impulses(inverse_mass, velocity, restitution, law.friction / share, rough)
+    rubbed = _coulomb_impulses(inverse_mass, velocity, restitution, 0.0, impulse)
+    if share <= 0.0 or rubbed < 0.0:
+        return rubbed
+    change = np.empty(len(impulse))
+    rubbed = _coulomb_impulses(inverse_mass, velocity, restitution, law.friction / share, change)
     if rubbed < 0.0:
         return rubbed
-    change = rough - impulse
+    _combine(change, 1.0, change, -1.0, impulse)
     for n in range(0, len(impulse), 3):
-        beyond = math.hypot(rough[n + 1], rough[n + 2]) - law.friction * change[n]
+        # Smooth impulses have nothing across the normal.
+        beyond = math.hypot(change[n + 1], change[n + 2]) - law.friction * change[n]
         if share * beyond > law.friction * impulse[n]:
             share = law.friction * impulse[n] / beyond
-    impulse += share * change
+    _combine(impulse, 1.0, impulse, share, change)
     return share * rubbed + 0.5 * share * (1.0 - share) * _product(inverse_mass, change, change)
 
 
@@ -252,5 +260,5 @@ def patch_impulses(a, b, contact, points, restitution, law, impulse):
     else:
         rubbed = _coulomb_impulses(inverse_mass, velocity, restitution, law.friction, impulse)
         if law.tangential_restitution > 0.0 and rubbed > 0.0:
-            rubbed -= _give_back(inverse_mass, velocity, law, impulse, rubbed)
+            rubbed = max(rubbed - _give_back(inverse_mass, velocity, law, impulse, rubbed), 0.0)
     return -_energy(inverse_mass, velocity, impulse) - rubbed, rubbed, rubbed >= 0.0
