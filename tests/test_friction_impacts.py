@@ -307,7 +307,7 @@ def test_pairs_of_all_shapes_keep_what_they_must(crowd, seed):
     """Momentum, angular momentum, and energy with all that was dissipated, each cause taking some or nothing."""
     rng = np.random.default_rng(seed)
     system, original = crowd.model.system, crowd.model.system.body.copy()
-    moment = _new_moment()
+    moment = _new_moment(system.law)
     patches = 0
     for _ in range(400):
         system.body[:] = original

@@ -292,9 +292,11 @@ class Solver:
         """Carry islands through their impacts; the paths with theirs, and how many islands were left unfinished."""
         system, neighbours, count = self._system, self.state.neighbours, len(islands.start) - 1
         team = ThreadTeam(ISLAND_COST * count)
+        friction = system.law if (system.law["friction"] > 0.0).any() else None
+        room = self._accumulator
         parts = team.each(
             lambda _, first, last: run_islands(
-                system, paths.clock, neighbours, predicted, islands, duration, self._accumulator, (first, last)
+                system, paths.clock, neighbours, predicted, islands, duration, room, (first, last, friction)
             ),
             count,
             4 * team.threads,

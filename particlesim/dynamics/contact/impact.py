@@ -41,11 +41,12 @@ class Moment(NamedTuple):
     actor: np.ndarray  # (m,) BODY, their records
     struck: np.ndarray  # (m,) int64, how many impacts each has had
     push: np.ndarray  # (m, 6) impulse [N s] and angular impulse [N m s] of the present round
+    friction: np.ndarray | None  # the contact laws; None where no pair has any friction
 
 
 @kernel
-def new_moment():
-    """Room for MAX_CONTACTS contacts."""
+def new_moment(friction):
+    """Room for MAX_CONTACTS contacts, with the contact laws if there is friction, or None."""
     bodies = 2 * MAX_CONTACTS
     return Moment(
         np.empty((MAX_CONTACTS, 2), dtype=np.int64),
@@ -55,6 +56,7 @@ def new_moment():
         np.empty(bodies, dtype=BODY),
         np.empty(bodies, dtype=np.int64),
         np.empty((bodies, 6)),
+        friction,
     )
 
 
@@ -146,8 +148,11 @@ def _common_factor(moment, size, gain):
 
 
 @kernel
-def _propose(system, moment, c, leave_slow):
-    """The impulse that contact ``c`` is to get in the present round; what becomes of it, and the energy it takes."""
+def _propose(system, moment, c, leave_slow, friction):
+    """The impulse that contact ``c`` is to get in the present round; what becomes of it, and the energy it takes.
+
+    Where there is no ``friction`` (None) nothing of it is compiled.
+    """
     contact = moment.contact[c]
     a, b = moment.actor[contact.a], moment.actor[contact.b]
     normal, offset = to_vec3(contact.normal), to_vec3(contact.offset)
@@ -158,7 +163,7 @@ def _propose(system, moment, c, leave_slow):
     what, factor = _rebound(system, a, b, -speed)
     if what == LEFT or (leave_slow and what != STRUCK):
         return NOTHING, 0.0
-    if has_friction(system, a, b):
+    if friction is not None and has_friction(system, a, b):
         impulse, turned_a, turned_b, energy = rough_impulse(
             system, a, b, contact, moment.points[c], point, factor - 1.0
         )
@@ -225,7 +230,7 @@ def resolve_contacts(system, moment, count, size, leave_slow, accumulator):
         moment.push[:size] = 0.0
         gain = 0.0
         for c in range(count):
-            what, energy = _propose(system, moment, c, leave_slow)
+            what, energy = _propose(system, moment, c, leave_slow, moment.friction)
             gain += energy
             if what != NOTHING:
                 outcome = what if outcome == NOTHING else min(outcome, what)

@@ -306,7 +306,7 @@ def _run_island(system, clock, neighbours, members, duration, queue, moment, seg
 
 @entry_kernel
 def run_islands(system, clock, neighbours, predicted, islands, duration, accumulator, block):
-    """Carry out the impacts of the islands of a block (first, last) within ``duration`` [s].
+    """Carry out the impacts of the islands of a block (first, last, contact laws if there is friction) in ``duration``.
 
     ``predicted`` are the impacts on the paths of the start. Adds to the row of ``accumulator`` (n, ACCUMULATED) of each
     island's first member. Returns the path segments, and how many islands were left with impacts to resolve.
@@ -314,7 +314,7 @@ def run_islands(system, clock, neighbours, predicted, islands, duration, accumul
     system, clock, neighbours, predicted, islands, accumulator = without_refcounts(
         (system, clock, neighbours, predicted, islands, accumulator)
     )
-    moment = new_moment()
+    moment = new_moment(block[2])
     segment = np.empty(256, dtype=SEGMENT)
     used = unfinished = 0
     queue = [(0.0, 0, 0, 0)]
