@@ -1,13 +1,16 @@
 """What is seen at each pixel, against rays cast one by one; and what lies in the shadow."""
 
+import sys
+
 import numpy as np
 import pytest
 
 from particlesim.core.constants import SPHERE
 from particlesim.core.parallel import use_threads
-from particlesim.geometry.shapes import capsule, cube, sphere
+from particlesim.geometry.shapes import capsule, cube, hull, sphere
 from particlesim.rendering.shading.lighting import key_light
 from particlesim.rendering.visibility.rasterise import rasterise
+from tests import sight
 from tests.sight import KINDS, Crowd, crowd, distances, onto, projection, rays, through
 from tests.test_render_picture import draw, edge, make_frame, make_scene
 
@@ -123,6 +126,18 @@ def test_the_shadow_of_a_rounded_shape_begins_within_it_and_has_its_outline(kind
         assert np.array_equal(met, np.isfinite(buffer.inverse_depth))
         begins = -buffer.inverse_depth[met]
         assert (begins > enter[met] - 1e-5).all() and (begins < leave[met] + 1e-5).all()
+
+
+def test_hulls_of_many_faces_are_seen_like_any_other(monkeypatch):
+    points = np.random.default_rng(7).normal(size=(300, 3))
+    ball = 0.5 * points / np.linalg.norm(points, axis=1)[:, None]
+    ring = [(0.5 * np.cos(t), 0.5 * np.sin(t)) for t in np.arange(60) * np.pi / 30.0]
+    drum = hull("drum", [(x, y, z) for z in (-0.4, 0.4) for x, y in ring])
+    for module in (sight, sys.modules[__name__]):
+        monkeypatch.setattr(module, "KINDS", (sphere(), hull("ball", ball), drum))
+    test_each_pixel_sees_what_its_ray_meets_first(WITHOUT, 1, 3)
+    test_each_pixel_sees_what_its_ray_meets_first(AMIDST, 1, 3)
+    test_a_parallel_view_is_told_how_deep_light_goes(3)
 
 
 def test_behind_a_wall_nothing_is_seen():

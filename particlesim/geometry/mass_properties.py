@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.geometry.convex_hull import loop_normal
+from particlesim.geometry.faces import face_normals, triangles_of
 from particlesim.geometry.tolerances import PRINCIPAL_AXES
 
 
@@ -50,8 +50,7 @@ def _polyhedron(vertices: np.ndarray, faces: Sequence[Sequence[int]]) -> tuple[f
     """
     origin = vertices[0]
     corners = vertices - origin
-    triangles = np.array([(f[0], f[k], f[k + 1]) for f in faces for k in range(1, len(f) - 1)])
-    a, b, c = (corners[triangles[:, k]] for k in range(3))
+    a, b, c = (corners[corner] for corner in triangles_of(faces)[1].T)
     six_volumes = np.einsum("ij,ij->i", a, np.cross(b, c))
     volume = six_volumes.sum() / 6.0
     s = a + b + c
@@ -92,7 +91,7 @@ def rounded_mass_properties(
     """
     core_volume, core_centroid, core_second = _polyhedron(vertices, faces)
     about = vertices - core_centroid
-    normals = np.array([loop_normal(about[list(loop)]) for loop in faces])
+    normals = face_normals(about, faces)
     parts = (
         _Integrals(core_volume, np.zeros(3), core_second),
         _prisms(about, faces, normals, radius),
@@ -127,9 +126,8 @@ def _prisms(vertices: np.ndarray, faces: Sequence[Sequence[int]], normals: np.nd
     Over a triangle of area A with corners a, b, c the integral of x x^T is A / 12 * (a a^T + b b^T + c c^T + s s^T)
     with s = a + b + c.
     """
-    rows = [(f, loop[0], loop[k], loop[k + 1]) for f, loop in enumerate(faces) for k in range(1, len(loop) - 1)]
-    face, *corners = np.array(rows).T
-    a, b, c = (vertices[corner] for corner in corners)
+    face, corners = triangles_of(faces)
+    a, b, c = (vertices[corner] for corner in corners.T)
     n, s = normals[face], a + b + c
     area = 0.5 * np.einsum("ij,ij->i", np.cross(b - a, c - a), n)
     in_plane = sum(_products(area / 12.0, corner, corner) for corner in (a, b, c, s))

@@ -1,41 +1,106 @@
-"""Vertices of mesh files, and their simplification."""
+"""The points that the faces of a mesh file have."""
 
 from __future__ import annotations
 
+import io
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from particlesim.geometry.convex_hull import convex_hull, corner_points
-from particlesim.geometry.tolerances import MAX_MESH_VERTICES
+# Metres in the units of length that a mesh may be in; the files do not say theirs.
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
+
+# A binary STL: a header, the number of its triangles (uint32), and so many bytes for each of them
+# (https://www.loc.gov/preservation/digital/formats/fdd/fdd000505.shtml).
+_STL_HEADER, _STL_COUNT, _STL_TRIANGLE = 80, 4, 50
+
+_PLY_HEADER_END = b"end_header"
 
 
-def mesh_vertices(path: Path) -> np.ndarray:
-    """Vertices of the convex hull of an STL, OBJ or PLY file, at most MAX_MESH_VERTICES of them, (v, 3).
+def mesh_vertices(path: Path, unit: str = "m") -> np.ndarray:
+    """The corners of the faces of an STL, OBJ or PLY file, (v, 3) float64 [m].
 
-    OSError or ValueError if the file cannot be read or encloses no volume.
+    Parameters
+    ----------
+    path : Path
+        The file.
+    unit : str
+        What its numbers are in, one of UNITS.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        If it is no mesh: the path, and what is wrong.
     """
+    if unit not in UNITS:
+        raise ValueError(f"the unit of a mesh must be one of {', '.join(UNITS)}, not {unit!r}")
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}")
+    points = _points(path, _readable(path, path.read_bytes()))
+    if not np.isfinite(points).all():
+        raise ValueError(f"{path}: holds numbers that are not finite")
+    return points * UNITS[unit]
+
+
+def _points(path: Path, data: bytes) -> np.ndarray:
+    """The corners of all faces, in the units of the file. ValueError if it has none."""
     import trimesh  # noqa: PLC0415  (slow to import, needed for meshes only)
 
-    if not path.is_file():
-        raise FileNotFoundError(f"no such file: {path}")
+    ending = path.suffix.lower().removeprefix(".")
+    if ending not in trimesh.available_formats():
+        raise ValueError(f"{path}: must be an STL, OBJ or PLY file")
     try:
-        loaded: Any = trimesh.load(path, force="mesh", process=False)
-        points = np.asarray(loaded.vertices, dtype=np.float64)
+        scene: Any = trimesh.load(io.BytesIO(data), file_type=ending, force="scene", process=False)
+        solids = [part for part in scene.dump() if len(getattr(part, "faces", ()))]
+        points = [part.vertices[np.unique(part.faces)] for part in solids]
     except Exception as error:
-        raise ValueError(f"{path} cannot be read as a mesh: {error}") from error
-    # Points inside faces and edges are no corners: what is left is thinned, so that a cube of many points stays one.
-    return _spread(corner_points(path.stem, points[convex_hull(path.stem, points).vertices]))
+        # What is missing may be a module that guesses what a text is written in: the file is to blame all the same.
+        words = "" if isinstance(error, ImportError) else f" ({' '.join(str(error).split()) or type(error).__name__})"
+        raise ValueError(f"{path}: truncated, or not a mesh: it ends at byte {len(data):,}{words}") from error
+    if not points:
+        raise ValueError(f"{path}: has no faces; points and lines are not a mesh")
+    return np.concatenate(points).astype(np.float64)
 
 
-def _spread(points: np.ndarray) -> np.ndarray:
-    """At most MAX_MESH_VERTICES of the points, each the farthest from those chosen before it."""
-    if len(points) <= MAX_MESH_VERTICES:
-        return points
-    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
-    distance = np.linalg.norm(points - points[chosen[0]], axis=1)
-    while len(chosen) < MAX_MESH_VERTICES:
-        chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return points[chosen]
+def _readable(path: Path, data: bytes) -> bytes:
+    """A mesh file whose text is UTF-8 and whose triangles are all there. ValueError if they are not."""
+    ending = path.suffix.lower()
+    if not data:
+        raise ValueError(f"{path}: is empty")
+    if ending == ".ply":
+        header, end, rest = data.partition(_PLY_HEADER_END)
+        return _as_utf8(header) + end + rest
+    if ending == ".stl":
+        return _whole_stl(path, data)
+    return _as_utf8(data) if ending == ".obj" else data
+
+
+def _as_utf8(text: bytes) -> bytes:
+    """Text as UTF-8. Other text is taken for Latin-1, where any byte is a letter: only names and remarks have any."""
+    try:
+        text.decode()
+    except UnicodeDecodeError:
+        return text.decode("latin-1").encode()
+    return text
+
+
+def _whole_stl(path: Path, data: bytes) -> bytes:
+    """An STL file without what follows its triangles. ValueError if it ends before them."""
+    ends = f"{path}: truncated, or not a mesh: it ends at byte {len(data):,}"
+    if re.match(rb"\s*solid[^\0]*?\b(facet|endsolid)\b", data[:4096]):
+        lower = data.lower()
+        if lower.rfind(b"facet") > lower.rfind(b"endsolid"):
+            raise ValueError(f"{ends} without 'endsolid'")
+        return _as_utf8(data)
+    start = _STL_HEADER + _STL_COUNT
+    if len(data) < start:
+        raise ValueError(f"{ends} within its header")
+    triangles = int.from_bytes(data[_STL_HEADER:start], "little")
+    whole = start + _STL_TRIANGLE * triangles
+    if len(data) < whole:
+        raise ValueError(f"{ends} where {triangles:,} triangles take {whole:,}")
+    return data[:whole]

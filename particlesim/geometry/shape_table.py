@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from particlesim.core.records import record
+from particlesim.geometry.shape_links import links_of
 from particlesim.geometry.shapes import Shape
 
 # A shape: a convex core and a rounding radius. Ranges are half open, into the other arrays of the table.
@@ -23,6 +25,7 @@ SHAPE = record(
         ("last_face", np.int64),
         ("first_edge", np.int64),
         ("last_edge", np.int64),
+        ("link", np.int64),  # where its part of the table's ``link`` begins; -1 of a shape without edges
     ],
 )
 
@@ -45,10 +48,16 @@ class ShapeTable(NamedTuple):
     face: np.ndarray  # (f,) FACE
     loop: np.ndarray  # (l,) int64, rows of vertex: the outlines of the faces, counter-clockwise seen from outside
     edge: np.ndarray  # (e, 4) int64: two rows of vertex, then the faces to the left and right, -1 for none
+    link: np.ndarray  # (k,) int64: which vertices, and which faces, are neighbours (see shape_links.py)
 
 
 def stack_shapes(shapes: Sequence[Shape]) -> ShapeTable:
-    """The shapes as one table for the kernels."""
+    """The shapes as one table for the kernels, which is not to be written to: the same shapes have the same one."""
+    return _stacked(tuple(shapes))
+
+
+@functools.lru_cache(maxsize=8)
+def _stacked(shapes: tuple[Shape, ...]) -> ShapeTable:
     table = np.zeros(len(shapes), dtype=SHAPE)
     for field in ("kind", "radius", "inradius", "rounding"):
         table[field] = [getattr(shape, field) for shape in shapes]
@@ -61,6 +70,7 @@ def stack_shapes(shapes: Sequence[Shape]) -> ShapeTable:
     for name, count in counts.items():
         table[f"last_{name}"] = np.cumsum(count)
         table[f"first_{name}"] = table[f"last_{name}"] - count
+    edges = [_numbered(rows, row) for rows, row in zip(edges, table, strict=True)]
     loops = [
         np.array(loop) + first
         for shape, first in zip(shapes, table["first_vertex"], strict=True)
@@ -71,19 +81,17 @@ def stack_shapes(shapes: Sequence[Shape]) -> ShapeTable:
         vertex=np.concatenate([np.zeros((0, 3)), *(shape.vertices for shape in shapes)]),
         face=_faces(shapes, [len(loop) for loop in loops]),
         loop=np.concatenate([np.zeros(0, dtype=np.int64), *loops]),
-        edge=np.concatenate(
-            [np.zeros((0, 4), dtype=np.int64), *(_numbered(e, s) for e, s in zip(edges, table, strict=True))]
-        ),
+        edge=np.concatenate([np.zeros((0, 4), dtype=np.int64), *edges]),
+        link=_links(shapes, edges, table),
     )
 
 
 def _faces(shapes: Sequence[Shape], corners: Sequence[int]) -> np.ndarray:
     """The faces of all shapes, (f,) FACE; ``corners`` says how many vertices each has."""
     face = np.zeros(len(corners), dtype=FACE)
-    normals = [normal for shape in shapes for normal in shape.face_normals]
-    starts = [shape.vertices[loop[0]] for shape in shapes for loop in shape.faces]
-    face["normal"] = np.array(normals).reshape(-1, 3)
-    face["offset"] = [float(normal @ start) for normal, start in zip(normals, starts, strict=True)]
+    starts = [shape.vertices[[loop[0] for loop in shape.faces]] for shape in shapes if shape.faces]
+    face["normal"] = np.concatenate([np.zeros((0, 3)), *(shape.face_normals for shape in shapes)])
+    face["offset"] = np.einsum("ij,ij->i", face["normal"], np.concatenate([np.zeros((0, 3)), *starts]))
     face["last"] = np.cumsum(corners)
     face["first"] = face["last"] - corners
     return face
@@ -93,3 +101,14 @@ def _numbered(edges: np.ndarray, shape: Any) -> np.ndarray:
     """Edges of one shape with the numbers that its vertices and faces have in the table."""
     shift = np.array([shape["first_vertex"], shape["first_vertex"], shape["first_face"], shape["first_face"]])
     return np.where(edges < 0, -1, edges + shift)
+
+
+def _links(shapes: Sequence[Shape], edges: Sequence[np.ndarray], table: np.ndarray) -> np.ndarray:
+    """The array ``link`` of the table; notes in ``table`` where each shape has its part of it."""
+    parts, size = [np.zeros(0, dtype=np.int64)], 0
+    for shape, rows, row in zip(shapes, edges, table, strict=True):
+        row["link"] = size if len(rows) else -1
+        if len(rows):
+            parts.append(links_of(shape.vertices, shape.faces, rows, int(row["first_vertex"]), size))
+            size += len(parts[-1])
+    return np.concatenate(parts)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,16 @@ from scipy.spatial.transform import Rotation
 
 from particlesim.core.constants import CAPSULE, HALF_SPACE, POLYHEDRON, SPHERE
 from particlesim.core.polyhedra import POLYHEDRA
-from particlesim.geometry.convex_hull import NO_VOLUME, Faces, distance_from_hull, hull_polygons, loop_normal
+from particlesim.geometry.convex_hull import (
+    NO_VOLUME,
+    convex_hull,
+    corner_points,
+    distance_from_hull,
+    hull_polygons,
+    spread,
+    triangulated_hull,
+)
+from particlesim.geometry.faces import Faces, Polyhedron, edges_of, face_normals
 from particlesim.geometry.mass_properties import (
     MassProperties,
     capsule_moments,
@@ -22,6 +32,7 @@ from particlesim.geometry.mass_properties import (
     rounded_mass_properties,
 )
 from particlesim.geometry.mesh_file import mesh_vertices
+from particlesim.geometry.tolerances import MAX_MESH_VERTICES
 
 _UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -51,6 +62,9 @@ class Shape:
     orientation : (4,) float64
         Quaternion (w, x, y, z) that turns the principal axes into the axes that the shape was described in; the
         identity where those are principal, as they are for all but meshes and hulls.
+    described_corners : int
+        How many corners the hull of a mesh has; more than there are vertices if it was thinned. Volume, centroid and
+        moments are those of the whole hull. 0 of a shape that is no hull.
     """
 
     name: str
@@ -63,6 +77,7 @@ class Shape:
     radius: float
     inradius: float
     orientation: np.ndarray
+    described_corners: int = 0
 
     @property
     def is_sphere(self) -> bool:
@@ -74,17 +89,17 @@ class Shape:
         """Whether it has a bounding sphere, as all shapes but half-spaces have."""
         return self.kind != HALF_SPACE
 
-    @property
+    @cached_property
     def face_normals(self) -> np.ndarray:
         """Outward unit normals of the faces, (f, 3)."""
-        return np.array([loop_normal(self.vertices[list(loop)]) for loop in self.faces]).reshape(-1, 3)
+        return face_normals(self.vertices, self.faces)
 
-    @property
+    @cached_property
     def edges(self) -> list[tuple[int, int, int, int]]:
         """Each edge of the core once: its two vertices, then the faces to its left and right, -1 for none."""
         if self.kind == CAPSULE:
             return [(0, 1, -1, -1)]
-        return _edges(self.faces) if self.kind == POLYHEDRON else []
+        return edges_of(self.faces) if self.kind == POLYHEDRON else []
 
 
 def sphere() -> Shape:
@@ -127,23 +142,54 @@ def hull(name: str, vertices: Any, rounding: float = 0.0) -> Shape:
         raise ValueError(f"the vertices of '{name}' must be rows of three finite numbers")
     if not 0.0 <= rounding < np.inf:
         raise ValueError(f"the rounding of '{name}' must be a number of 0 or more, not {rounding!r}")
-    corners, faces = hull_polygons(name, points)
-    mass = _mass(corners, faces, rounding)
+    core = hull_polygons(name, points)
+    return _about_centroid(name, core, core, rounding)
+
+
+def _about_centroid(name: str, core: Polyhedron, whole: Polyhedron, rounding: float) -> Shape:
+    """A polyhedron with rounding about the centroid and in the principal axes of another, which it stands for."""
+    mass = _mass(*whole, rounding)
     _, axes = principal_axes(mass.inertia)
-    body = np.ascontiguousarray((corners - mass.centroid) @ axes)
     # Again in the principal axes: in others, what is small about a needle is a difference of what is large.
-    mass = _mass(body, faces, rounding)
+    again = _mass((whole[0] - mass.centroid) @ axes, whole[1], rounding)
+    body = np.ascontiguousarray((core[0] - mass.centroid) @ axes)
+    return principal_hull(
+        name,
+        (body, core[1]),
+        rounding,
+        volume=again.volume,
+        moments=np.diag(again.inertia).copy(),
+        orientation=np.roll(Rotation.from_matrix(axes).as_quat(canonical=True), 1),
+        described_corners=len(whole[0]),
+    )
+
+
+def principal_hull(name: str, core: Polyhedron, rounding: float, **properties: Any) -> Shape:
+    """A polyhedron with rounding that is about its centroid and in its principal axes already.
+
+    Parameters
+    ----------
+    name : str
+    core : (vertices (v, 3) float64 [m], loops of vertex numbers)
+    rounding : float [m]
+    **properties
+        volume, moments, orientation and described_corners, as in ``Shape``.
+
+    Raises
+    ------
+    ValueError
+        If the shape encloses no volume.
+    """
+    vertices, faces = core
     shape = Shape(
         name=name,
         kind=POLYHEDRON,
-        vertices=body,
+        vertices=vertices,
         faces=faces,
         rounding=float(rounding),
-        volume=mass.volume,
-        moments=np.diag(mass.inertia).copy(),
-        radius=float(np.linalg.norm(body, axis=1).max()) + float(rounding),
-        inradius=_depth_of_centroid(body, faces) + float(rounding),
-        orientation=np.roll(Rotation.from_matrix(axes).as_quat(canonical=True), 1),
+        radius=float(np.linalg.norm(vertices, axis=1).max()) + float(rounding),
+        inradius=_depth_of_centroid(vertices, faces) + float(rounding),
+        **properties,
     )
     if not min(shape.volume, shape.inradius, *shape.moments) > 0.0:
         raise ValueError(NO_VOLUME.format(name))
@@ -153,22 +199,14 @@ def hull(name: str, vertices: Any, rounding: float = 0.0) -> Shape:
 def _mass(corners: np.ndarray, faces: Faces, rounding: float) -> MassProperties:
     """Mass properties of a polyhedron with rounding, which may be 0."""
     if rounding > 0.0:
-        return rounded_mass_properties(corners, faces, _edges(faces), rounding)
+        return rounded_mass_properties(corners, faces, edges_of(faces), rounding)
     return mass_properties(corners, faces)
-
-
-def _edges(faces: Faces) -> list[tuple[int, int, int, int]]:
-    """The edges of a closed polyhedron."""
-    left = {}
-    for face, loop in enumerate(faces):
-        for start, end in zip(loop, loop[1:] + loop[:1], strict=True):
-            left[start, end] = face
-    return [(a, b, left[a, b], left[b, a]) for a, b in sorted(left) if a < b]
 
 
 def _depth_of_centroid(vertices: np.ndarray, faces: Faces) -> float:
     """How deep the origin is in a core; below 0 if it is outside, as the centroid of a flat core that is rounded."""
-    depth = float(min(loop_normal(vertices[list(loop)]) @ vertices[loop[0]] for loop in faces))
+    starts = vertices[[loop[0] for loop in faces]]
+    depth = float(np.einsum("ij,ij->i", face_normals(vertices, faces), starts).min())
     return depth if depth >= 0.0 else -distance_from_hull(np.zeros(3), vertices)
 
 
@@ -184,13 +222,20 @@ def pyramid(height: float = 1.0, rounding: float = 0.0) -> Shape:
     return hull("pyramid", [*base, (0.0, 0.0, height)], rounding)
 
 
-def mesh(file: str | Path, rounding: float = 0.0) -> Shape:
-    """The convex hull of an STL, OBJ or PLY file in its own units, thinned to MAX_MESH_VERTICES corners.
+def mesh(file: str | Path, rounding: float = 0.0, unit: str = "m") -> Shape:
+    """The convex hull of an STL, OBJ or PLY file whose numbers are in ``unit``: m, cm, mm, um or in.
 
-    OSError or ValueError if the file cannot be read or encloses no volume.
+    A hull of more than MAX_MESH_VERTICES corners is thinned to so many; mass properties stay those of the whole.
+    OSError or ValueError if the file cannot be read, is no mesh or encloses no volume.
     """
     path = Path(file)
-    return hull(path.stem, mesh_vertices(path), rounding)
+    name, points = path.stem, mesh_vertices(path, unit)
+    # Points inside faces and edges are no corners: what is left is thinned, so that a cube of many points stays one.
+    corners = corner_points(name, points[convex_hull(name, points).vertices])
+    if len(corners) <= MAX_MESH_VERTICES:
+        return hull(name, corners, rounding)
+    core = hull_polygons(name, spread(corners, MAX_MESH_VERTICES))
+    return _about_centroid(name, core, triangulated_hull(name, corners), rounding)
 
 
 def _polyhedron(name: str) -> Callable[..., Shape]:

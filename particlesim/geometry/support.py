@@ -1,4 +1,7 @@
-"""How far a shape reaches in a direction: the one loop over the vertices of a core, and the only tests of kind.
+"""How far a shape reaches in a direction: the one search among the vertices of a core, and the only tests of kind.
+
+Cores of few vertices are gone through; those of many are climbed along their edges, from a vertex near the top that is
+looked up by the direction.
 
 A shape that is placed somewhere is a tuple (row of the shape table, size, orientation). A shape that the narrow phase
 has turned already is a tuple (row, size, rotation matrix).
@@ -8,7 +11,19 @@ import math
 
 from particlesim.core.constants import HALF_SPACE, SPHERE
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import dot, load_vec3, mat_transposed_vec, mat_vec, quat_to_matrix, rotate, scale, to_vec3
+from particlesim.core.math3d import (
+    dot,
+    load_vec3,
+    mat_transposed_vec,
+    mat_vec,
+    quat_to_matrix,
+    rotate,
+    scale,
+    sub,
+    to_vec3,
+)
+from particlesim.geometry.shape_links import cell_of, ring_of
+from particlesim.geometry.tolerances import CLIMBED_VERTICES
 
 
 @kernel
@@ -23,10 +38,45 @@ def farthest_row(vertices, first, last, direction):
 
 
 @kernel
+def _climb(hull, core, direction):
+    """As ``farthest_vertex``, from vertex to vertex along edges: on a convex body no way up ends below the top."""
+    vertices, link = hull
+    best = link[core[2] + cell_of(direction)]
+    # Rounding could lead round in a circle.
+    for _ in range(core[1] - core[0]):
+        here, top, gain = load_vec3(vertices, best), best, 0.0
+        first, last = ring_of(link, core, best)
+        for k in range(first, last):
+            higher = dot(sub(load_vec3(vertices, link[k]), here), direction)
+            if higher > gain:
+                top, gain = link[k], higher
+        if top == best:
+            break
+        best = top
+    return best
+
+
+@kernel
+def farthest_vertex(hull, core, direction):
+    """Number of the vertex of a core that is farthest along ``direction``, in body axes.
+
+    ``hull`` are the arrays (vertex, link) of the shape table, ``core`` the (first vertex, last vertex, link) of a row.
+    """
+    if core[1] - core[0] < CLIMBED_VERTICES:
+        return farthest_row(hull[0], core[0], core[1], direction)
+    return _climb(hull, core, direction)
+
+
+@kernel
+def core_of(shape):
+    """The core of a SHAPE row as ``farthest_vertex`` takes it."""
+    return shape.first_vertex, shape.last_vertex, shape.link
+
+
+@kernel
 def support_vertex(table, shape, direction):
     """Number of the vertex of a shape's core that is farthest along ``direction``, which is in body axes."""
-    record = table.shape[shape]
-    return farthest_row(table.vertex, record.first_vertex, record.last_vertex, direction)
+    return farthest_vertex((table.vertex, table.link), core_of(table.shape[shape]), direction)
 
 
 @kernel
@@ -80,6 +130,12 @@ def is_point(table, shape):
 def has_faces(table, shape):
     """Whether the core of a shape is a polyhedron."""
     return table.shape[shape].last_face > table.shape[shape].first_face
+
+
+@kernel
+def has_many_vertices(table, shape):
+    """Whether a core is better asked for its farthest vertices than gone through, vertex by vertex or face by face."""
+    return table.shape[shape].last_vertex - table.shape[shape].first_vertex >= CLIMBED_VERTICES
 
 
 @kernel

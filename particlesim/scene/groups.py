@@ -85,11 +85,16 @@ class PyramidShape(Model):
     rounding: Rounding = 0.0
 
 
+# What the numbers of a mesh file are in, which the file does not say.
+_Unit = Annotated[Literal["m", "cm", "mm", "um", "in"], one_of("m", "cm", "mm", "um", "in")]
+
+
 class MeshShape(Model):
     """The convex hull of an STL, OBJ or PLY file, times the size. Paths start at the scene file's folder."""
 
     kind: Literal["mesh"]
     file: File
+    unit: _Unit = "m"
     rounding: Rounding = 0.0
 
     @field_validator("file")

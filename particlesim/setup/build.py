@@ -25,7 +25,7 @@ from particlesim.scene.groups import FixedSize, Group, ListPlacement, MeshShape,
 from particlesim.scene.surface import WALLS
 from particlesim.setup.initial_motion import random_quaternions, set_in_motion
 from particlesim.setup.obstacles import Obstacle, obstruct
-from particlesim.setup.placement import positions
+from particlesim.setup.placement import positions, unit_hint
 from particlesim.setup.space import Crowd, Space
 
 # Density of particles that give neither density nor mass: water [kg/m^3].
@@ -133,12 +133,12 @@ def _shapes(scene: Scene) -> tuple[list[Shape], list[int]]:
     numbers: dict[str, int] = {}
     of_group = []
     for g, group in enumerate(scene.particles):
-        if isinstance(group.shape, MeshShape) and not group.shape.file.is_file():
-            raise _shape_error(g, group, "is a folder" if group.shape.file.is_dir() else "no such file")
         try:
             shape = CATALOGUE[group.shape.kind](**group.shape.model_dump(exclude={"kind"}))
         except (OSError, ValueError) as error:
-            raise _shape_error(g, group, " ".join(str(error).split())) from None
+            reason = error.strerror if isinstance(error, OSError) else None
+            words = f"cannot be read: {reason}" if reason else str(error)
+            raise _shape_error(g, group, " ".join(words.split())) from None
         if shape.inradius <= _FLATTEST * shape.radius:
             raise _shape_error(g, group, "is too flat to be a body")
         name = group.shape.model_dump_json()
@@ -152,7 +152,7 @@ def _shapes(scene: Scene) -> tuple[list[Shape], list[int]]:
 def _shape_error(g: int, group: Group, message: str) -> SceneError:
     if isinstance(group.shape, MeshShape):
         file = str(group.shape.file)
-        return SceneError(message.removeprefix(f"{file} "), _key(g, "shape.file"), file)
+        return SceneError(message.removeprefix(f"{file}: "), _key(g, "shape.file"), file)
     return SceneError(message, _key(g, "shape"))
 
 
@@ -207,15 +207,16 @@ def _check_sizes(scene: Scene, domain: np.void, particles: np.ndarray) -> None:
         widest = 2.0 * particles["radius"][members].max(initial=0.0)
         narrowest = 2.0 * particles["inradius"][members].max(initial=0.0)
         for axis, edge in enumerate(domain["upper"] - domain["lower"]):
+            wrong = None
             if domain["boundary"][axis] == PERIODIC and widest >= 0.5 * edge:
-                message = (
+                wrong = (
                     f"too large: particles span {widest:.4g} m; "
                     f"in a periodic world they must span less than half of it, {0.5 * edge:.4g} m"
                 )
-                raise SceneError(message, _key(g, "size"), value)
-            if domain["boundary"][axis] == WALL and narrowest > edge:
-                message = f"too large: particles are {narrowest:.4g} m thick, between walls {edge:.4g} m apart"
-                raise SceneError(message, _key(g, "size"), value)
+            elif domain["boundary"][axis] == WALL and narrowest > edge:
+                wrong = f"too large: particles are {narrowest:.4g} m thick, between walls {edge:.4g} m apart"
+            if wrong is not None:
+                raise SceneError(wrong + unit_hint(group), _key(g, "size"), value)
 
 
 def _check_volume(scene: Scene, domain: np.void, shapes: list[Shape], particles: np.ndarray) -> None:
@@ -223,7 +224,9 @@ def _check_volume(scene: Scene, domain: np.void, shapes: list[Shape], particles:
     volumes = np.array([s.volume for s in shapes])[particles["shape_row"]] * particles["scale"] ** 3
     fill = float(volumes.sum() / (domain["upper"] - domain["lower"]).prod())
     if fill > 1.0 and not (domain["boundary"] == OPEN).any():
-        raise SceneError(f"do not fit: their volumes add up to {fill:.3g} times the world's", "particles")
+        hints = [unit_hint(group) for group in scene.particles]
+        wrong = f"do not fit: their volumes add up to {fill:.3g} times the world's"
+        raise SceneError(wrong + max(hints), "particles")
 
 
 def _quaternion(orientation: tuple[float, ...] | Turn | str) -> np.ndarray:

@@ -15,6 +15,7 @@ from particlesim.scene.groups import (
     Group,
     LatticePlacement,
     ListPlacement,
+    MeshShape,
     RandomPlacement,
     Region,
 )
@@ -33,6 +34,12 @@ _TRIALS_A_CALL = 4096
 _CROWD = 50
 _FIRST_LOOK = 128
 _PLACED_BY_DOUBLING = 1.0 / 6.0
+
+
+def unit_hint(group: Group) -> str:
+    """What may be wrong where particles of a group are too large."""
+    in_metres = isinstance(group.shape, MeshShape) and group.shape.unit == "m"
+    return '; if the file of the mesh is in millimetres, give its shape unit = "mm"' if in_metres else ""
 
 
 def positions(
@@ -58,7 +65,7 @@ def positions(
             extent = (above[members] - below[members]).max(axis=0, initial=0.0)
             position[members] = _on_lattice(g, group.placement, world, len(members), extent, randoms[g])
     inserted = {
-        g: _Trials(g, group.placement, world, (below, above), members, randoms[g])
+        g: _Trials(g, group, group.placement, world, (below, above), members, randoms[g])
         for g, (group, members) in enumerate(zip(scene.particles, groups, strict=True))
         if isinstance(group.placement, RandomPlacement | ClusterPlacement) and len(members)
     }
@@ -222,6 +229,7 @@ class _Trials:
     def __init__(
         self,
         g: int,
+        group: Group,
         where: RandomPlacement | ClusterPlacement,
         world: Space,
         extent: tuple[np.ndarray, np.ndarray],
@@ -237,13 +245,14 @@ class _Trials:
         self._centres = np.zeros((0, 3))
         if isinstance(where, ClusterPlacement):
             self._centres = _centres(g, where, (lower, upper), int(members.max()) + 1, random)
+        self._too_large = "too large: there are particles wider than the region they are placed in" + unit_hint(group)
         self._key = f"particles[{g}].size"
 
     def draw(self, indices: np.ndarray) -> np.ndarray:
         """A position for each particle of ``indices`` (m,), (m, 3)."""
         lower, upper = self._lower[indices], self._upper[indices]
         if (lower > upper).any():
-            raise SceneError("too large: there are particles wider than the region they are placed in", self._key)
+            raise SceneError(self._too_large, self._key)
         points = self._proposed(indices, lower, upper)
         is_round = _is_round(self._where.region)
         # What falls outside is drawn again, so that the cluster is cut off rather than piled up at the wall.

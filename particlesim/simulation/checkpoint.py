@@ -101,7 +101,8 @@ def _plain(array: np.ndarray) -> Any:
 
 def _described(shape: Shape) -> dict[str, Any]:
     """A shape as JSON, which keeps every bit of a float64."""
-    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in vars(shape).items()}
+    values = {f.name: getattr(shape, f.name) for f in fields(shape)}
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
 
 
 def _shape(described: dict[str, Any]) -> Shape:

@@ -64,7 +64,7 @@ class Chunks:
     """The arrays of a GSD file by frame and name. TrajectoryError if it is none, or if its index is damaged."""
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self.path = path
         if not path.is_file():
             raise TrajectoryError(f"{path}: no such file")
         _check_index(path)
@@ -96,7 +96,7 @@ class Chunks:
         values = self.read(name, frame).astype(np.float64)
         if values.size != count * len(default) or not np.isfinite(values).all():
             what = f"{name} of frame {frame} is not {len(default)} finite numbers a particle"
-            raise TrajectoryError(f"{self._path}: damaged: {what}")
+            raise TrajectoryError(f"{self.path}: damaged: {what}")
         return values.reshape(count, len(default))
 
 

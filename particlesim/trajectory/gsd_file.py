@@ -22,15 +22,17 @@ import numpy as np
 from particlesim.core.atomic_write import atomic_write
 from particlesim.core.constants import CAPSULE, DISSIPATION, SPHERE, WALL_NAMES
 from particlesim.core.rotations import conjugates, quaternion_products
-from particlesim.geometry.shapes import Shape, capsule, hull, sphere
+from particlesim.geometry.convex_hull import hull_polygons
+from particlesim.geometry.shapes import Shape, capsule, principal_hull, sphere
 from particlesim.scene import Scene
 from particlesim.scene.file import parse_scene
 from particlesim.trajectory.frames import Frame, Header, Ledger
 from particlesim.trajectory.gsd_chunks import Chunks, TrajectoryError, reading
 
 # Other programs draw a shape for each type and do not scale it. Groups of more sizes than this get that many types,
-# evenly spread; the exact sizes are in the file as well.
-_MAX_SIZES = 64
+# evenly spread; the exact sizes are in the file as well. All types of a group have no more corners than this, so that
+# hulls of thousands do not fill the file.
+_MAX_SIZES, _MAX_CORNERS = 64, 20_000
 
 # What the schema does not have is among its logged quantities; text is stored as bytes. Under the second prefix OVITO
 # finds quantities of the particles.
@@ -63,6 +65,9 @@ _SHAPES: dict[str, tuple[int, ...]] = {
     "dissipated": (len(DISSIPATION),),
     "wall_shear": (len(WALL_NAMES), 3),
 }
+
+
+_OLDER = "written by an older particlesim; simulate its scene again"
 
 
 class TrajectoryWriter:
@@ -123,7 +128,7 @@ class Trajectory:
                 if not chunks.frames or not chunks.has(_LOG + "scene"):
                     raise TrajectoryError(f"{path}: not written by particlesim, or without frames")
                 if not all(chunks.has(name) for name in (_IMPACTS, *_ledger_names())):
-                    raise TrajectoryError(f"{path}: written by an older particlesim; simulate its scene again")
+                    raise TrajectoryError(f"{path}: {_OLDER}")
                 self.header = _checked(_read_header(chunks))
         except BaseException:
             chunks.close()
@@ -186,7 +191,8 @@ def _display_types(header: Header) -> tuple[list[tuple[str, dict[str, Any]]], np
     for group in np.unique(header.group):
         members = np.flatnonzero(header.group == group)
         shape = header.shapes[int(header.shape[members[0]])]
-        for rank in _size_classes(header.size[members]):
+        most = max(1, min(_MAX_SIZES, _MAX_CORNERS // len(shape.vertices)))
+        for rank in _size_classes(header.size[members], most):
             size = float(np.mean(header.size[members[rank]]))
             type_of[members[rank]] = len(types)
             types.append((f"{shape.name}_{group}_{len(types)}", _gsd_shape(shape, size)))
@@ -199,11 +205,11 @@ def _display_diameters(header: Header) -> np.ndarray:
     return np.where(spheres, header.size, 2.0).astype(np.float32)
 
 
-def _size_classes(size: np.ndarray) -> list[np.ndarray]:
-    """Which particles share a displayed size: index arrays."""
+def _size_classes(size: np.ndarray, most: int) -> list[np.ndarray]:
+    """Which particles share a displayed size, of which there are ``most`` at the most: index arrays."""
     values, which = np.unique(size, return_inverse=True)
-    if len(values) > _MAX_SIZES:
-        return np.array_split(np.argsort(size, kind="stable"), _MAX_SIZES)
+    if len(values) > most:
+        return np.array_split(np.argsort(size, kind="stable"), most)
     return [np.flatnonzero(which == k) for k in range(len(values))]
 
 
@@ -234,6 +240,9 @@ def _header_log(header: Header) -> dict[str, np.ndarray]:
             "vertices": s.vertices.tolist(),
             "rounding": s.rounding,
             "orientation": s.orientation.tolist(),
+            "volume": s.volume,
+            "moments": s.moments.tolist(),
+            "described_corners": s.described_corners,
         }
         for s in header.shapes
     ]
@@ -248,6 +257,8 @@ def _header_log(header: Header) -> dict[str, np.ndarray]:
 
 def _read_header(chunks: Chunks) -> Header:
     described = json.loads(chunks.read(_LOG + "shapes").tobytes())
+    if any("vertices" in shape and "described_corners" not in shape for shape in described):
+        raise TrajectoryError(f"{chunks.path}: {_OLDER}")
     shape = chunks.read(_LOG + "shape").astype(np.int64)
     return Header(
         scene_json=chunks.read(_LOG + "scene").tobytes().decode(),
@@ -267,7 +278,11 @@ def _read_shape(described: dict[str, Any]) -> Shape:
         return sphere()
     if len(vertices) == 2:
         return capsule(vertices[1][2] - vertices[0][2])
-    return hull(described["name"], vertices, described.get("rounding", 0.0))
+    name, rounding = described["name"], described["rounding"]
+    core = hull_polygons(name, np.array(vertices, dtype=np.float64))
+    arrays = {key: np.array(described[key], dtype=np.float64).reshape(-1) for key in ("moments", "orientation")}
+    volume, corners = float(described["volume"]), int(described["described_corners"])
+    return principal_hull(name, core, rounding, volume=volume, described_corners=corners, **arrays)
 
 
 def _checked(header: Header) -> Header:

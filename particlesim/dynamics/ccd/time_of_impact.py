@@ -24,7 +24,7 @@ from particlesim.dynamics.ccd.conservative_advancement import (
 )
 from particlesim.dynamics.settings import IMPACT_TOLERANCE, KEEP_NORMAL_MOTION, MAX_ADVANCEMENTS
 from particlesim.geometry.narrow_phase.pair import pair_separation
-from particlesim.geometry.support import is_half_space, is_sphere
+from particlesim.geometry.support import core_of, is_half_space, is_sphere
 from particlesim.model.bodies import angular_velocity_of
 from particlesim.model.domain import nearest_image
 from particlesim.model.free_motion import free_rotation
@@ -95,10 +95,9 @@ def spheres_near(offset, velocity, reach, duration):
 
 
 @kernel
-def core_of(system, b):
-    """First and last vertex and size of a body's core, as the steps of conservative advancement take it."""
-    s = system.shapes.shape[b.shape_row]
-    return s.first_vertex, s.last_vertex, b.scale
+def sized_core(system, b):
+    """A body's core and its size, as the steps of conservative advancement take them."""
+    return core_of(system.shapes.shape[b.shape_row]), b.scale
 
 
 @kernel
@@ -200,11 +199,11 @@ def _velocity_at(paths, time):
 @kernel
 def stays_apart(system, a, b, paths, offset, normal, duration):
     """Whether a normal that stands is proven to separate two bodies, now at ``offset``, for ``duration`` [s]."""
-    vertex = system.shapes.vertex
+    hull = system.shapes.vertex, system.shapes.link
     path_a, path_b = paths
-    core_a, core_b = core_of(system, a), core_of(system, b)
-    reach_a = core_reach(vertex, core_a, scale(inverse_rotate(path_a[1], normal), a.scale), _STILL, 0.0)[0]
-    reach_b = core_reach(vertex, core_b, scale(inverse_rotate(path_b[1], normal), -b.scale), _STILL, 0.0)[0]
+    core_a, core_b = sized_core(system, a), sized_core(system, b)
+    reach_a = core_reach(hull, core_a, scale(inverse_rotate(path_a[1], normal), a.scale), _STILL, 0.0)[0]
+    reach_b = core_reach(hull, core_b, scale(inverse_rotate(path_b[1], normal), -b.scale), _STILL, 0.0)[0]
     reach_a += system.shapes.shape[a.shape_row].rounding * a.scale
     reach_b += system.shapes.shape[b.shape_row].rounding * b.scale
     # What nearly touches is left to the search, which knows whether that is an impact.
@@ -220,7 +219,7 @@ def stays_apart(system, a, b, paths, offset, normal, duration):
     side_a = core_a, path_a[1], angular_velocity_of(path_a[1], path_a[3], to_vec3(a.principal_inertia))
     side_b = core_b, path_b[1], angular_velocity_of(path_b[1], path_b[3], to_vec3(b.principal_inertia))
     known = normal, gap, offset, sub(path_b[2], path_a[2]), (0.0, 0.0), bound
-    return conservative_step(vertex, side_a, side_b, known, _STILL, duration) >= duration
+    return conservative_step(hull, side_a, side_b, known, _STILL, duration) >= duration
 
 
 @kernel
@@ -230,13 +229,13 @@ def first_touch(system, a, b, paths, interval, depth, simplex, points):
     With ``depth`` [m] it is when the separation falls to minus that. At the moment returned it is larger, by
     IMPACT_TOLERANCE of their sizes at most. ``simplex`` is the one by which they were nearest before, or NO_SIMPLEX.
     """
-    vertex, period = system.shapes.vertex, system.domain[0].period
+    hull, period = (system.shapes.vertex, system.shapes.link), system.domain[0].period
     path_a, path_b = paths
     time, end = interval
     half_space = is_half_space(system.shapes, b.shape_row)
     sizes = a.scale if half_space else a.scale + b.scale
     tolerance = IMPACT_TOLERANCE * sizes
-    core_a, core_b = core_of(system, a), core_of(system, b)
+    core_a, core_b = sized_core(system, a), sized_core(system, b)
     acceleration = relative_acceleration(paths)
     turning = _surface_speed(system, a, path_a) + _surface_speed(system, b, path_b)
     radii = _core_radius(system, a) + _core_radius(system, b)
@@ -270,7 +269,7 @@ def first_touch(system, a, b, paths, interval, depth, simplex, points):
         # The normal of a half-space must turn with it, on a cone; any other goes the shortest way.
         coning = norm(u) * norm(cross(u, normal)) * bounds[1] if half_space else 0.0
         known = normal, gap, offset, velocity, bounds, bound + coning
-        step, best = longest_step(vertex, (core_a, q, w), (core_b, p, u), known, motion, left)
+        step, best = longest_step(hull, (core_a, q, w), (core_b, p, u), known, motion, left)
         if step >= left:
             return math.inf
         time, last_gap = time + step, gap

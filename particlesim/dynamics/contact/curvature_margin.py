@@ -22,7 +22,7 @@ from particlesim.core.math3d import (
     to_vec3,
 )
 from particlesim.dynamics.ccd.conservative_advancement import facing_edge, turning_with_edges
-from particlesim.dynamics.ccd.time_of_impact import core_of
+from particlesim.dynamics.ccd.time_of_impact import sized_core
 from particlesim.dynamics.settings import LEVEL_VERTICES
 from particlesim.geometry.support import is_sphere
 
@@ -33,7 +33,8 @@ _STILL = (0.0, 0.0, 0.0)
 def _edge_facing(system, b, direction):
     """The edge of a polyhedron that faces ``direction``, in world axes; (0, 0, 0) if a vertex or a face does."""
     orientation = to_quat(b.orientation)
-    edge, lag, next_lag = facing_edge(system.shapes.vertex, core_of(system, b), inverse_rotate(orientation, direction))
+    hull, core = (system.shapes.vertex, system.shapes.link), sized_core(system, b)
+    edge, lag, next_lag = facing_edge(hull, core, inverse_rotate(orientation, direction))
     return rotate(orientation, edge) if lag <= LEVEL_VERTICES < next_lag else _STILL
 
 

@@ -19,25 +19,24 @@ from particlesim.core.math3d import (
     sub,
     to_vec3,
 )
-from particlesim.geometry.support import rounding_of, support_vertex, turned, vertex_position
-from particlesim.geometry.tolerances import MAX_MESH_VERTICES, ON_EDGE, PARALLEL_TOLERANCE
+from particlesim.geometry.shape_links import ring_of
+from particlesim.geometry.support import core_of, rounding_of, support_vertex, turned, vertex_position
+from particlesim.geometry.tolerances import MAX_FACE_CORNERS, ON_EDGE, PARALLEL_TOLERANCE
 
 # A polygon clipped by a polygon has at most the corners of both.
-MAX_CORNERS = 2 * MAX_MESH_VERTICES
+MAX_CORNERS = 2 * MAX_FACE_CORNERS
 
 
 @kernel
 def _flattest_edge(table, shape, vertex, direction, tilt):
     """The other end of the edge at ``vertex`` that runs across ``direction``, within ``tilt``; -1 if none."""
-    vertices, edge, record = table.vertex, table.edge, table.shape[shape]
-    other, least = -1, tilt
-    for e in range(record.first_edge, record.last_edge):
-        if edge[e, 0] == vertex or edge[e, 1] == vertex:
-            end = edge[e, 0] + edge[e, 1] - vertex
-            span = sub(load_vec3(vertices, end), load_vec3(vertices, vertex))
-            slope = abs(dot(span, direction)) / norm(span)
-            if slope < least:
-                other, least = end, slope
+    start, other, least = load_vec3(table.vertex, vertex), -1, tilt
+    first, last = ring_of(table.link, core_of(table.shape[shape]), vertex)
+    for k in range(first, last):
+        span = sub(load_vec3(table.vertex, table.link[k]), start)
+        slope = abs(dot(span, direction)) / norm(span)
+        if slope < least:
+            other, least = table.link[k], slope
     return other
 
 
@@ -59,17 +58,20 @@ def _facing_face(table, shape, direction, tilt):
 def support_feature(table, body, offset, direction, tilt, feature):
     """Write the face, edge or vertex of a turned core at ``offset`` that faces ``direction``.
 
-    Faces and edges may be inclined by ``tilt`` [sine of the angle]. ``feature`` is (MAX_CORNERS, 3). Returns how many
-    corners there are, and how much a face is inclined; inf if it is none.
+    Faces and edges may be inclined by ``tilt`` [sine of the angle]. ``feature`` is (MAX_CORNERS, 3); of a face of more
+    than MAX_FACE_CORNERS it has so many, evenly spread. Returns how many corners there are, and how much a face is
+    inclined; inf if it is none.
     """
     shape = body[0]
     local = mat_transposed_vec(body[2], direction)
     face, slope = _facing_face(table, shape, local, tilt)
     if face >= 0:
-        first, last = table.face[face].first, table.face[face].last
-        for k in range(first, last):
-            store_vec3(feature, k - first, add(offset, vertex_position(table, body, table.loop[k])))
-        return last - first, slope
+        first, corners = table.face[face].first, table.face[face].last - table.face[face].first
+        count = min(corners, MAX_FACE_CORNERS)
+        for k in range(count):
+            corner = table.loop[first + k * corners // count]
+            store_vec3(feature, k, add(offset, vertex_position(table, body, corner)))
+        return count, slope
     vertex = support_vertex(table, shape, local)
     store_vec3(feature, 0, add(offset, vertex_position(table, body, vertex)))
     other = _flattest_edge(table, shape, vertex, local, tilt)

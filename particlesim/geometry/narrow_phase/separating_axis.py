@@ -25,8 +25,9 @@ from particlesim.core.math3d import (
     sub,
     to_vec3,
 )
+from particlesim.geometry.narrow_phase.expanding_polytope import expanded_depth
 from particlesim.geometry.support import bounding_radius, farthest_row, has_faces, vertex_position
-from particlesim.geometry.tolerances import FACE_FIRST, PARALLEL_EDGES
+from particlesim.geometry.tolerances import FACE_FIRST, MANY_EDGE_PAIRS, PARALLEL_EDGES
 
 _NOWHERE = (0.0, 0.0, 0.0)
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -211,6 +212,13 @@ def _thin_depth(table, a, b, offset):
 
 
 @kernel
+def _edge_pairs(table, shape_a, shape_b):
+    """How many pairs of edges two cores have, about: with a point each edge is a pair as well."""
+    a, b = table.shape[shape_a], table.shape[shape_b]
+    return (a.last_edge - a.first_edge + 1) * (b.last_edge - b.first_edge + 1)
+
+
+@kernel
 def core_depth(table, a, b, offset):
     """Separation of two cores along the best axis, and that axis, from a to b in world axes.
 
@@ -218,6 +226,10 @@ def core_depth(table, a, b, offset):
     Negative: the exact penetration depth, the shortest shift that parts the cores. Positive: a lower bound of the
     distance.
     """
+    if _edge_pairs(table, a[0], b[0]) >= MANY_EDGE_PAIRS:
+        separation, normal, proven = expanded_depth(table, a, b, offset)
+        if proven:
+            return separation, normal
     if has_faces(table, a[0]):
         return _polyhedron_depth(table, a, b, offset)
     if has_faces(table, b[0]):

@@ -10,13 +10,21 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.core.jit import kernel
+from particlesim.geometry.shape_links import faces_beside
 from particlesim.rendering.visibility.scan_lines import add_line, no_lines, rotated, row_between
+
+# So many planes are gone through at each pixel. Among more the one is sought from that of the pixel before, from face
+# to face: where a ray meets a plane beyond the border of its face, it meets that of the face beside it later.
+_FEW_PLANES = 16
 
 
 @kernel
 def rasterise_polyhedron(i, placed, shapes, strip, box, scratch, buffer):
     """A polyhedron before the eye."""
     outline, first = _project(placed, shapes, strip, scratch), shapes.shape[placed[0]].first_face
+    if outline[0] > _FEW_PLANES:
+        _walk_rows(i, placed[0], shapes, (True, outline), box, scratch, buffer)
+        return
     for row in range(box[0], box[1]):
         start, end = _project_row(scratch, outline, row, box[2], box[3])
         for column in range(start, end):
@@ -57,6 +65,9 @@ def rasterise_near_polyhedron(i, placed, shapes, strip, scratch, buffer):
 def rasterise_polyhedron_shadow(placed, shapes, strip, box, scratch, inverse_depth):
     """A polyhedron in a parallel projection, by the faces that it turns away."""
     outline = _project(placed, shapes, strip, scratch)
+    if outline[0] > _FEW_PLANES:
+        _walk_rows_of_shadow(placed[0], shapes, (False, outline), box, scratch, inverse_depth)
+        return
     for row in range(box[0], box[1]):
         start, end = _project_row(scratch, outline, row, box[2], box[3])
         for column in range(start, end):
@@ -122,3 +133,55 @@ def _project_row(scratch, outline, row, first, last):
         scratch.row_plane[k, 0] = scratch.plane[f, 1] * row + scratch.plane[f, 2]
         scratch.row_plane[k, 1] = scratch.plane[f, 0]
     return begin, beyond
+
+
+@kernel
+def _at(plane, f, row, column):
+    return plane[f, 0] * column + (plane[f, 1] * row + plane[f, 2])
+
+
+@kernel
+def _walk(shapes, beside, f, front, scratch, row, column):
+    """The plane that bounds a polyhedron at a pixel, by a walk from face ``f``, and its inverse depth there.
+
+    Of those that face the eye, ``front``, the farthest; of the others the nearest.
+    """
+    best, q = f, _at(scratch.plane, f, row, column)
+    for _ in range(len(scratch.plane)):  # rounding could lead round in a circle
+        here = best
+        for k in range(shapes.face[here].first, shapes.face[here].last):
+            other = shapes.link[beside + k]
+            if scratch.facing[other] == front:
+                there = _at(scratch.plane, other, row, column)
+                if (there < q) == front and there != q:
+                    best, q = other, there
+        if best == here:
+            break
+    return best, q
+
+
+@kernel
+def _walk_rows(i, shape, shapes, outline, box, scratch, buffer):
+    """As ``rasterise_polyhedron``, of one of many faces, which are projected."""
+    front, (_, ends) = outline
+    f, first, beside = scratch.bounding[0], shapes.shape[shape].first_face, faces_beside(shapes, shape)
+    for row in range(box[0], box[1]):
+        begin, beyond = row_between(scratch.line, ends, row, box[2], box[3])
+        for column in range(begin, beyond):
+            f, q = _walk(shapes, beside, f, front, scratch, row, column)
+            if buffer.inverse_depth[row, column] < q:
+                buffer.inverse_depth[row, column] = q
+                buffer.id[row, column] = i
+                buffer.primitive[row, column] = f - first
+
+
+@kernel
+def _walk_rows_of_shadow(shape, shapes, outline, box, scratch, inverse_depth):
+    """As ``rasterise_polyhedron_shadow``, of one of many faces, which are projected."""
+    front, (_, ends) = outline
+    f, beside = scratch.bounding[0], faces_beside(shapes, shape)
+    for row in range(box[0], box[1]):
+        begin, beyond = row_between(scratch.line, ends, row, box[2], box[3])
+        for column in range(begin, beyond):
+            f, q = _walk(shapes, beside, f, front, scratch, row, column)
+            inverse_depth[row, column] = max(inverse_depth[row, column], q)
