@@ -1,7 +1,10 @@
 """Broken scene files: one line that says the file, the key, the value, and what is allowed."""
 # ruff: noqa: E501  (the expected lines stand here whole)
 
+import tomllib
+
 import pytest
+import trimesh
 
 import particlesim as ps
 from particlesim.setup.build import build
@@ -377,6 +380,15 @@ def test_a_broken_scene_gets_this_line(text, line, tmp_path, monkeypatch):
     assert str(error) == f"scene.toml: {line}"
 
 
+@pytest.mark.parametrize(("text", "line"), BROKEN, ids=[line[:60] for _, line in BROKEN])
+def test_from_python_it_is_the_same_line(text, line):
+    if not text or line.startswith("not valid TOML"):
+        return
+    with pytest.raises(ps.SceneError) as caught:
+        build(ps.Scene(**tomllib.loads(text)))
+    assert str(caught.value) == line
+
+
 MESHES = {
     "none.stl": (None, "no such file"),
     ".": (None, "is a folder"),
@@ -396,11 +408,34 @@ def test_a_broken_mesh_gets_a_line(name, tmp_path):
         (tmp_path / name).write_bytes(content)
     path = tmp_path / "scene.toml"
     path.write_text(group(shape=f'{{ kind = "mesh", file = "{name}" }}'))
-    with pytest.raises(ps.SceneError) as caught:
-        build(ps.load_scene(path))
     file = tmp_path if name == "." else tmp_path / name
-    assert str(caught.value).startswith(f'particles[0].shape.file = "{file}"'[:40])
-    assert str(caught.value).endswith(f": {line}")
+    shape = {"kind": "mesh", "file": file}
+    for make in (
+        lambda: ps.load_scene(path),
+        lambda: ps.Scene(world={"size": [9, 9, 9]}, particles=[{"shape": shape, "count": 1}]),
+    ):
+        with pytest.raises(ps.SceneError) as caught:
+            # What is not there is said at once, what is wrong with it when it is read.
+            build(make()) if content is not None else make()
+        assert 'particles[0].shape.file = "' in str(caught.value)
+        assert str(caught.value).endswith(f": {line}")
+
+
+def test_a_mesh_in_millimetres_gets_a_hint(tmp_path):
+    trimesh.creation.box((250.0, 250.0, 250.0)).export(tmp_path / "part.stl")
+    path = tmp_path / "scene.toml"
+    hint = '; if the file of the mesh is in millimetres, give its shape unit = "mm"'
+    for boundary, wrong in (("wall", "thick, between walls 4 m apart"), ("periodic", "half of it, 2 m")):
+        mesh = '{ kind = "mesh", file = "part.stl" }'
+        path.write_text(world(boundary=f'"{boundary}"').replace('shape = "sphere"', f"shape = {mesh}"))
+        with pytest.raises(ps.SceneError, match="too large") as caught:
+            build(ps.load_scene(path))
+        assert str(caught.value).endswith(wrong + hint)
+    path.write_text(group(shape='{ kind = "mesh", file = "part.stl", unit = "mm" }', size="1"))
+    assert build(ps.load_scene(path)).particles["radius"][0] == pytest.approx(0.125 * 3**0.5)
+    path.write_text(group(shape='{ kind = "mesh", file = "part.stl", unit = "mile" }'))
+    with pytest.raises(ps.SceneError, match=r"shape.unit = \"mile\": must be 'm', 'cm', 'mm', 'um' or 'in'"):
+        ps.load_scene(path)
 
 
 def test_files_that_are_no_scenes(tmp_path):

@@ -74,7 +74,7 @@ class Gas:
             "solver": {"time_step": time_step()},
             "particles": groups,
         }
-        return Scene.model_validate(table)
+        return Scene(**table)
 
 
 GASES = (

@@ -112,7 +112,7 @@ def _compile(scene: Scene) -> None:
             {"shape": "sphere", "count": 1},
         ],
     }
-    Simulation(Scene.model_validate(table)).run(duration=0.5)
+    Simulation(Scene(**table)).run(duration=0.5)
 
 
 def _among(wanted: range | None, total: int) -> range:

@@ -6,20 +6,25 @@ Every model refuses unknown keys. Where a table has kinds, its usual kind has a 
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from particlesim.scene.base import MAX_COUNT, Model, PlainFloat, Text, whole
 from particlesim.scene.camera import Camera, FixedCamera, Movie, Show
+from particlesim.scene.errors import SceneError
 from particlesim.scene.groups import Group
 from particlesim.scene.messages import hint, must_be, shown
 from particlesim.scene.surface import WALLS, Contact
+from particlesim.scene.validation_errors import explain
 from particlesim.scene.world import Solver, World
 
 
 class Scene(Model):
-    """A whole scene. ``Scene(...)`` in Python takes what a scene file says, as dicts or as the models above."""
+    """A whole scene. ``Scene(...)`` in Python takes what a scene file says, as dicts or as the models above.
+
+    SceneError, in one line, if it is wrong. Paths start at the current folder.
+    """
 
     title: Text = ""
     seed: Annotated[int, Field(ge=0, le=2**63 - 1), whole, must_be("a whole number from 0 to 2^63 - 1")] = 0
@@ -31,6 +36,12 @@ class Scene(Model):
     movie: Movie = Field(default_factory=Movie)
     camera: Camera = Field(default_factory=lambda: FixedCamera(kind="fixed"))
     show: Show = Field(default_factory=Show)
+
+    def __init__(self, /, **table: Any) -> None:
+        try:
+            super().__init__(**table)
+        except ValidationError as error:
+            raise SceneError(*explain(error, table, Scene)) from None
 
     @model_validator(mode="after")
     def _one_scale_for_a_field(self) -> Scene:

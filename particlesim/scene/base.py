@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Annotated, Any
 
 from PIL import ImageColor
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
+from particlesim.scene.errors import SceneError
 from particlesim.scene.messages import OUT_OF_REACH, hint, must_be
+from particlesim.scene.validation_errors import explain
 
 # The sizes that numbers of a scene may have, other than 0: the fifth powers and the products that inertias, momenta
 # and energies are made of stay well inside double precision.
@@ -52,9 +57,42 @@ File = Annotated[Path, must_be("the path of a file, in quotes")]
 
 
 class Model(BaseModel):
-    """Base of every table of a scene: unknown keys are refused, assignments are checked."""
+    """Base of every table of a scene: unknown keys are refused, assignments are checked.
+
+    SceneError, in one line, for an assignment that is not allowed.
+    """
 
     model_config = ConfigDict(extra="forbid", validate_assignment=True)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        try:
+            super().__setattr__(name, value)
+        except ValidationError as error:
+            raise SceneError(*explain(error, {name: value}, type(self))) from None
+
+
+# The folder that paths in a scene start at; None for a scene that was stored, whose files need not be there any more.
+_folder: ContextVar[Path | None] = ContextVar("folder", default=Path())
+
+
+@contextmanager
+def paths_from(folder: Path | None) -> Iterator[None]:
+    """Let paths in scenes that are made in the ``with`` block start at a folder; None: as they are, unseen."""
+    token = _folder.set(folder)
+    try:
+        yield
+    finally:
+        _folder.reset(token)
+
+
+def existing_file(path: Path) -> Path:
+    """The path from the folder of its scene. ValueError if there is no such file."""
+    folder = _folder.get()
+    if folder is None:
+        return path
+    if not (folder / path).is_file():
+        raise ValueError("is a folder" if (folder / path).is_dir() else "no such file")
+    return folder / path
 
 
 def shorthand(

@@ -7,24 +7,9 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from particlesim.scene import Scene
-from particlesim.scene.messages import shown
-from particlesim.scene.validation_errors import explain
-
-
-class SceneError(ValueError):
-    """One line: the file, the key path, the value, and what is allowed."""
-
-    def __init__(self, message: str, key: str = "", value: Any = None, file: str | Path | None = None) -> None:
-        self.key, self.value, self.message, self.file = key, value, message, file
-        where = f"{key} = {shown(value)}" if key and value is not None else key
-        super().__init__(": ".join(str(part) for part in (file, where, message) if part))
-
-    def within(self, file: str | Path) -> SceneError:
-        """The same error, said of a scene read from ``file``."""
-        return SceneError(self.message, self.key, self.value, file)
+from particlesim.scene.base import paths_from
+from particlesim.scene.errors import SceneError
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -39,15 +24,24 @@ def load_scene(path: str | Path) -> Scene:
         raise SceneError(f"not valid TOML: {error}", file=path) from None
     except RecursionError:
         raise SceneError("not valid TOML: brackets within brackets without end", file=path) from None
+    except ValueError:  # Python reads no whole number of more than some thousand digits
+        raise SceneError("not valid TOML: a number of thousands of digits", file=path) from None
     return parse_scene(table, path)
 
 
 def parse_scene(table: dict[str, Any], path: str | Path | None = None) -> Scene:
     """The scene that a table of plain values describes; paths in it start at the folder of ``path``, if given."""
     try:
-        return Scene.model_validate(table, context={"folder": Path(path).parent} if path else None)
-    except ValidationError as error:
-        raise SceneError(*explain(error, table), path) from None
+        with paths_from(Path(path).parent if path else Path()):
+            return Scene(**table)
+    except SceneError as error:
+        raise error if path is None else error.within(path) from None
+
+
+def stored_scene(table: dict[str, Any]) -> Scene:
+    """The scene of a run that was stored: the files that it names were read then and need not be there."""
+    with paths_from(None):
+        return Scene(**table)
 
 
 def _text(path: Path) -> str:

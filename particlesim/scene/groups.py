@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -12,9 +11,7 @@ from pydantic import (
     Discriminator,
     Field,
     Tag,
-    ValidationInfo,
     WithJsonSchema,
-    field_validator,
     model_validator,
 )
 
@@ -32,6 +29,7 @@ from particlesim.scene.base import (
     Text,
     Vector,
     colour_or,
+    existing_file,
     shorthand,
     whole,
 )
@@ -93,14 +91,9 @@ class MeshShape(Model):
     """The convex hull of an STL, OBJ or PLY file, times the size. Paths start at the scene file's folder."""
 
     kind: Literal["mesh"]
-    file: File
+    file: Annotated[File, AfterValidator(existing_file)]
     unit: _Unit = "m"
     rounding: Rounding = 0.0
-
-    @field_validator("file")
-    @classmethod
-    def _from_folder(cls, file: Path, info: ValidationInfo) -> Path:
-        return info.context["folder"] / file if info.context else file
 
 
 _Shapes = Annotated[

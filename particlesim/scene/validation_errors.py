@@ -7,7 +7,6 @@ from typing import Any, NamedTuple, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from particlesim.scene import Scene
 from particlesim.scene.messages import hint, listed
 
 # What a value must be, by pydantic's name of the error.
@@ -27,22 +26,22 @@ class _Spot(NamedTuple):
     models: tuple[type[BaseModel], ...]
 
 
-def explain(error: ValidationError, table: dict[str, Any]) -> tuple[str, str, Any]:
-    """The first error of a scene: message, key path, and the value there (None if there is none to show)."""
+def explain(error: ValidationError, table: dict[str, Any], model: type[BaseModel]) -> tuple[str, str, Any]:
+    """The first error of a table that follows ``model``: message, key path, and the value there, None for a table."""
     # A misspelt key is also a missing one: the misspelling comes first.
     errors = sorted(error.errors(), key=lambda e: (e["type"] == "missing", e["type"] != "extra_forbidden"))
     first = errors[0]
     kind, location = first["type"], first["loc"]
     if kind in ("missing", "extra_forbidden"):
         *above, name = location
-        spot = _find(tuple(above), table)
+        spot = _find(tuple(above), table, model)
         allowed = list(spot.models[0].model_fields) if spot.models else []
         if kind == "missing":
             return f"the key '{name}' is missing", _path(spot.keys), _shown(spot.value)
         keys = (*spot.keys, str(name))
         meant = hint(str(name), allowed) or f"; allowed: {', '.join(allowed)}"
         return f"unknown key{meant}", _path(keys), _shown(spot.value.get(name))
-    spot = _find(location, table)
+    spot = _find(location, table, model)
     if kind == "union_tag_invalid" and isinstance(spot.value, dict):
         spot = spot._replace(keys=(*spot.keys, "kind"), value=spot.value["kind"])
     return _message(first, spot), _path(spot.keys), _shown(spot.value)
@@ -72,18 +71,18 @@ def _kinds(spot: _Spot, word: str) -> str:
     return hint(word, kinds) or f"; allowed: {listed(kinds)}"
 
 
-def _find(location: tuple[str | int, ...], table: dict[str, Any]) -> _Spot:
+def _find(location: tuple[str | int, ...], table: dict[str, Any], model: type[BaseModel]) -> _Spot:
     """The place of a pydantic location in a file.
 
     Pydantic puts the kinds of tables between the keys, and keys that a shorthand leaves out; neither is in the file.
     """
-    spot = _Spot((), table, (Scene,))
+    spot = _Spot((), table, (model,))
     for step in location:
         chosen = tuple(model for model in spot.models if step in _kinds_of(model))
         if chosen:
             spot = spot._replace(models=chosen)
         elif isinstance(step, int):
-            inside = isinstance(spot.value, list) and step < len(spot.value)
+            inside = isinstance(spot.value, list | tuple) and step < len(spot.value)
             spot = _Spot((*spot.keys, step), spot.value[step], spot.models) if inside else spot
         elif isinstance(spot.value, dict) and step in spot.value:
             models = _models_in(spot.models[0].model_fields[step].annotation)

@@ -18,7 +18,7 @@ from particlesim.geometry.shape_table import ShapeTable
 from particlesim.geometry.shapes import Shape
 from particlesim.model.system import Model, System
 from particlesim.scene import Scene
-from particlesim.scene.file import SceneError, parse_scene
+from particlesim.scene.file import SceneError, stored_scene
 
 _FORMAT = 2
 
@@ -87,7 +87,7 @@ def _assembled(text: dict[str, Any], arrays: dict[str, np.ndarray]) -> Checkpoin
     counted = _under("counts.", arrays)
     counts = Counts(**{f.name: _plain(counted[f.name]) for f in fields(Counts)})
     state = SolverState.of_arrays(_under("state.", arrays))
-    return Checkpoint(parse_scene(json.loads(text["scene"])), model, state, counts, text["done"])
+    return Checkpoint(stored_scene(json.loads(text["scene"])), model, state, counts, text["done"])
 
 
 def _under(prefix: str, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -25,7 +25,7 @@ from particlesim.core.rotations import conjugates, quaternion_products
 from particlesim.geometry.convex_hull import hull_polygons
 from particlesim.geometry.shapes import Shape, capsule, principal_hull, sphere
 from particlesim.scene import Scene
-from particlesim.scene.file import parse_scene
+from particlesim.scene.file import stored_scene
 from particlesim.trajectory.frames import Frame, Header, Ledger
 from particlesim.trajectory.gsd_chunks import Chunks, TrajectoryError, reading
 
@@ -151,7 +151,7 @@ class Trajectory:
         """The scene that the trajectory is of. SceneError if this version cannot read it."""
         with reading(self.path):
             table = json.loads(self.header.scene_json)
-        scene = parse_scene(table)
+        scene = stored_scene(table)
         if len(self.header.group) != scene.number or (self.header.group >= len(scene.particles)).any():
             raise TrajectoryError(f"{self.path}: damaged: its particles are not those of its scene")
         return scene
