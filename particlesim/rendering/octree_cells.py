@@ -16,7 +16,7 @@ _DEEPEST = 8
 
 
 def cell_lines(lower: np.ndarray, upper: np.ndarray, depth: np.ndarray, width: float) -> np.ndarray:
-    """Instances of a line layer for boxes ``lower`` .. ``upper`` (k, 3) [m] of ``depth`` (k,); ``width`` [pixels]."""
+    """Lines (see gl.geometry) for boxes ``lower`` .. ``upper`` (k, 3) [m] of ``depth`` (k,); ``width`` [pixels]."""
     start, end = geometry.box_edges(np.asarray(lower), np.asarray(upper))
     colour = np.empty((len(depth), 4))
     colour[:, :3] = map_colours(np.asarray(depth) / _DEEPEST)

@@ -8,7 +8,7 @@ from types import TracebackType
 import numpy as np
 
 from particlesim.rendering.camera import View, view_at
-from particlesim.rendering.gl import geometry, platform
+from particlesim.rendering.gl import platform
 from particlesim.rendering.hud.history import History
 from particlesim.rendering.hud.overlay import Overlay
 from particlesim.rendering.look import Look
@@ -19,12 +19,12 @@ from particlesim.rendering.shading.environment import Environment
 from particlesim.rendering.shading.floor import FloorOcclusion
 from particlesim.rendering.shading.fxaa import fxaa
 from particlesim.rendering.shading.lighting import key_light
-from particlesim.rendering.shading.surfaces import TILE, surface_table, surfaces_of
+from particlesim.rendering.shading.shade import Paint, Seen, seen_instances, shade
 from particlesim.rendering.visibility.geometry_tables import geometry_tables
 from particlesim.rendering.visibility.instances import Instances, instances_of
 from particlesim.rendering.visibility.occlusion_clusters import OcclusionClusters, occlusion_clusters
 from particlesim.rendering.visibility.projection import Projection
-from particlesim.rendering.visibility.rasterise import VisibilityBuffer, rasterise
+from particlesim.rendering.visibility.rasterise import rasterise
 from particlesim.trajectory.frames import Frame
 
 # Widths of lines [pixels] in a picture 720 pixels high: the edges of the world, and those of the octree's cells.
@@ -55,12 +55,8 @@ class Renderer:
         )
         shaded = environment.has_floor and quality.ambient_occlusion
         self._floor = FloorOcclusion(*environment.floor, tables.inradius, tables.radius) if shaded else None
-        tile = np.array([(0.5 * TILE, 0.5 * TILE, 0.0)])
-        self._surfaces = [bridge.Layer(kind, tile) for kind in bridge.SURFACES]
-        floor = [bridge.Layer(bridge.FLOOR, geometry.SQUARE)] if environment.has_floor else []
-        self._lines = bridge.Layer(bridge.LINE, geometry.STRIP)
-        layers = [*self._surfaces, *floor, self._lines]
-        self._canvas = bridge.Canvas(found, self._size, layers, environment.background, quality.samples)
+        self._lines = bridge.Lines()
+        self._canvas = bridge.Canvas(found, self._size, self._lines, quality.samples)
 
     def __enter__(self) -> Renderer:
         return self
@@ -94,18 +90,15 @@ class Renderer:
         clusters = occlusion_clusters(instances.position, instances.tables.radius)
         projection = self._projection(view)
         buffer = rasterise(projection, instances, clusters)
-        # While the shadow map is made, what the camera sees is tabled: that leaves a core idle now and then.
+        # While the shadow map is made, it is found what is seen: that leaves a core idle now and then.
         shadow = self._beside.submit(self._shadow_map, instances, clusters)
-        pixel, surfaces = self._put_particles(frame, instances, projection, buffer)
+        paint = self._paint(view, frame, instances, seen_instances(buffer, len(instances.position)))
         self._put_lines(view, frame)
-        picture = self._bridge.Picture(
-            view_block=self._view_block(view),
-            shadow=shadow.result(),
-            pixel=pixel,
-            surfaces=surfaces,
-            floor=np.ones((1, 1)) if self._floor is None else self._floor.light(instances.position, instances.source),
-        )
-        drawn = self._canvas.draw(picture)
+        lighting = self._light.in_view(projection, shadow.result())
+        ground = self._environment.ground(self._floor_light(instances))
+        colours = shade(projection, buffer, instances, paint, lighting, ground)
+        depth = 1.0 - np.float32(view.near) * buffer.inverse_depth
+        drawn = self._canvas.draw(self._bridge.Picture(self._view_block(view), colours, depth))
         # OpenGL's first row is the lowest, and it has a fourth channel.
         image = fxaa(drawn) if self._quality.fxaa else np.ascontiguousarray(drawn[::-1, :, :3])
         self._overlay.draw(image, frame, history or History())
@@ -116,22 +109,19 @@ class Renderer:
         axes = view.pose[:3, :3].T * np.array([[1.0], [1.0], [-1.0]])
         return Projection(axes, view.pose[:3, 3], False, 0.5 * self._drawn_size[1] / slope, self._drawn_size)
 
-    def _put_particles(
-        self, frame: Frame, instances: Instances, projection: Projection, buffer: VisibilityBuffer
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Tiles into the layers of surfaces; what is seen at each pixel, and its table (see Picture)."""
-        surfaces = surfaces_of(buffer, instances.tables)
-        for layer, tiles in zip(self._surfaces, surfaces.tiles, strict=True):
-            layer.put(TILE * np.argwhere(tiles)[:, ::-1])
-        paint = self._paint(frame, instances, surfaces.seen)
-        return surfaces.pixel, surface_table(surfaces, instances, projection, paint)
-
-    def _paint(self, frame: Frame, instances: Instances, indices: np.ndarray) -> np.ndarray:
-        """Linear colour, and share of the ambient light, of some instances, (k, 4) float64."""
-        light = np.ones(len(indices))
+    def _paint(self, view: View, frame: Frame, instances: Instances, seen: Seen) -> Paint:
+        """What the instances that are seen are coloured with."""
+        light = np.ones(len(seen.indices))
         if self._ambient_occlusion is not None:
-            light = self._ambient_occlusion.light(instances.position, indices, instances.source)
-        return np.column_stack([self._look.colours(frame, instances.bodies(indices)), light])
+            light = self._ambient_occlusion.light(instances.position, seen.indices, instances.source)
+        colours = self._look.colours(frame, instances.bodies(seen.indices))
+        return Paint(seen, np.column_stack([colours, light]).astype(np.float64), self._environment.haze(view))
+
+    def _floor_light(self, instances: Instances) -> np.ndarray:
+        """Share of the light that reaches the floor, (b, a) float32; (0, 0) if there is none."""
+        if self._floor is not None:
+            return self._floor.light(instances.position, instances.source)
+        return np.ones((2, 2) if self._environment.has_floor else (0, 0), dtype=np.float32)
 
     def _shadow_map(self, instances: Instances, clusters: OcclusionClusters) -> np.ndarray:
         """The shadow map: closeness to the key light of the surface that it shines on, (h, w) float32 [m]."""
@@ -147,9 +137,9 @@ class Renderer:
         self._lines.put(np.vstack(rows))
 
     def _view_block(self, view: View) -> np.ndarray:
-        """The uniform block of shaders/common.glsl, float32."""
+        """The uniform block of shaders/line.vert, float32."""
         width, height = self._drawn_size
-        right, up, back, eye = view.pose[:3].T
+        _, _, back, eye = view.pose[:3].T
         slope = np.tan(0.5 * view.field_of_view)
         projection = np.zeros((4, 4))
         projection[0, 0] = height / (slope * width)
@@ -159,18 +149,7 @@ class Renderer:
         projection[3, 2] = -1.0
         rotation = np.eye(4)
         rotation[:3, :3] = view.pose[:3, :3].T
-        rows = [
-            (*eye, 0.0),
-            (*self._light.towards, 0.0),
-            (1.0 / self._light.pixels[0], 1.0 / self._light.pixels[1], *self._light.pixels),
-            *self._environment.colour_rows(),
-            (width, height, 1.0, -view.near),
-            (*-back, 2.0 * slope / height),
-            (*right, 0.0),
-            (*up, 0.0),
-            (slope * width / height, slope, 0.0, 0.0),
-            *self._environment.place_rows(view),
-        ]
+        rows = [(*eye, 0.0), (*-back, 0.0), (width, height, 0.0, 0.0)]
         # By columns, as OpenGL has them.
-        matrices = [(projection @ rotation).T.ravel(), self._light.matrix(eye).T.ravel()]
-        return np.concatenate([*matrices, np.ravel(rows)], dtype=np.float32, casting="same_kind")
+        numbers = [(projection @ rotation).T.ravel(), np.ravel(rows)]
+        return np.concatenate(numbers, dtype=np.float32, casting="same_kind")

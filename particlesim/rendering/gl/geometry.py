@@ -1,11 +1,8 @@
-"""Vertices and instances of what is drawn, as the arrays that the layers of pyrender_bridge take. Plain numpy."""
+"""Vertices and instances of what is drawn, as the arrays that pyrender_bridge takes. Plain numpy."""
 
 from __future__ import annotations
 
 import numpy as np
-
-# Corners of the square that the floor is drawn on, in the order of a triangle strip.
-SQUARE = np.array([(-1, -1, 0), (1, -1, 0), (-1, 1, 0), (1, 1, 0)], dtype=np.float32)
 
 # Corners of a line's strip: x from its start to its end, y from one side to the other.
 STRIP = np.array([(0, -1, 0), (0, 1, 0), (1, -1, 0), (1, 1, 0)], dtype=np.float32)
@@ -22,7 +19,7 @@ def box_edges(lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def lines(start: np.ndarray, end: np.ndarray, colour: np.ndarray, width: float) -> np.ndarray:
-    """Instances of a line layer, (m, 11): ends (m, 3) [m], ``colour`` (m, 4) sRGB and opacity, width [pixels]."""
+    """Lines, (m, 11): ends (m, 3) [m], ``colour`` (m, 4) sRGB and opacity, width [pixels]."""
     return np.hstack([start, np.full((len(start), 1), width), end, colour]).astype(np.float32)
 
 

@@ -29,7 +29,7 @@ def encoded(colour: str) -> np.ndarray:
 
 
 def parse(colour: str) -> np.ndarray:
-    """A colour name or '#rrggbb' as linear light, (3,) float64. Squared, as the shaders take the root."""
+    """A colour name or '#rrggbb' as linear light, (3,) float64. Squared, as the root is taken of light."""
     return encoded(colour) ** 2
 
 

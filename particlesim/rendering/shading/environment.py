@@ -7,6 +7,7 @@ import numpy as np
 from particlesim.rendering.camera import View
 from particlesim.rendering.gl import geometry
 from particlesim.rendering.shading.colour import encoded
+from particlesim.rendering.shading.shade_floor import Ground
 from particlesim.scene import Scene
 
 # The floor fades out over this fraction of the world's longer horizontal side.
@@ -37,20 +38,19 @@ class Environment:
         """Half the width of the floor with its fading rim, (2,) [m], and its height [m]."""
         return 0.5 * self._size[:2] + self._rim, -0.5 * float(self._size[2])
 
-    def colour_rows(self) -> list[tuple[float, ...]]:
-        """Rows of the uniform block: the background, and the floor in the light and in the shadow."""
-        return [(*self.background, 1.0), (*self._bright, 1.0), (*(_FLOOR_SHADOW * self._bright), 1.0)]
+    def ground(self, light: np.ndarray) -> Ground:
+        """The background and the floor; ``light`` (b, a) float32: share of the light that reaches the floor."""
+        colours = np.array([self.background, self._bright, _FLOOR_SHADOW * self._bright])
+        return Ground(colours, np.array([*(0.5 * self._size[:2]), -0.5 * self._size[2], self._rim]), light)
 
-    def place_rows(self, view: View) -> list[tuple[float, ...]]:
-        """Rows of the uniform block: where the floor is, and where the haze."""
+    def haze(self, view: View) -> np.ndarray:
+        """Where far things become pale, as ``Paint`` has it: from the nearest corner of the world to the farthest."""
         back, eye = view.pose[:3, 2], view.pose[:3, 3]
-        x, y, z = 0.5 * self._size
-        # Haze grows through the world, from its nearest corner to its farthest.
         depth = float(np.abs(back) @ self._size)
-        return [(x, y, -z, self._rim), (float(back @ eye) - 0.5 * depth, 1.0 / depth, _HAZE, 0.0)]
+        return np.array([float(back @ eye) - 0.5 * depth, 1.0 / depth, _HAZE])
 
     def box_lines(self, view: View, width: float) -> np.ndarray:
-        """Instances of a line layer for the edges of the world, ``width`` [pixels] wide; none if a scene hides it."""
+        """Lines (see gl.geometry) for the edges of the world, ``width`` [pixels] wide; none if a scene hides it."""
         if not self._scene.box_shown:
             return np.zeros((0, 11), dtype=np.float32)
         upper = 0.5 * self._size

@@ -54,7 +54,7 @@ class FloorOcclusion:
         source : slice or (m,) int64
             The body that each is an image of (see instances.py).
         """
-        width, depth = (max(1, round(2.0 * half / self._step)) for half in self._half)
+        width, depth = (max(2, round(2.0 * half / self._step)) for half in self._half)
         light = np.ones((depth, width))
         corner = np.array([*-self._half, self._height])
         _shade(np.ascontiguousarray(position), self._radius[source], corner, 2.0 * self._half, light)

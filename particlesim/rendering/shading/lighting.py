@@ -36,15 +36,33 @@ class Light(NamedTuple):
         """The projection of the shadow map."""
         return Projection(self.axes, np.zeros(3), True, self.pixels[0] / (2.0 * self.reach[0]), self.pixels)
 
-    def matrix(self, eye: np.ndarray) -> np.ndarray:
-        """From places seen from ``eye`` to coordinates in the shadow map, 0 .. 1, and closeness to the light [m].
+    def in_view(self, view: Projection, closeness: np.ndarray) -> Lighting:
+        """The light on what ``view`` shows; ``closeness`` (h, w) float32 [m]: the shadow map."""
+        texels = self.projection.scale
+        to_map = (self.axes * [[texels], [texels], [-1.0]]) @ np.column_stack([view.axes.T, view.eye])
+        to_map[:, 3] += 0.5 * self.pixels[0] - 0.5, 0.5 * self.pixels[1] - 0.5, _BEFORE * self.reach[2]
+        return Lighting(view.axes @ self.towards, np.ascontiguousarray(view.axes[:, 2]), to_map, closeness)
 
-        (4, 4). Places seem a little closer than they are, or rounding would cast shadows.
-        """
-        matrix = np.eye(4)
-        matrix[:3, :3] = self.axes * [[0.5 / self.reach[0]], [0.5 / self.reach[1]], [-1.0]]
-        matrix[:3, 3] = matrix[:3, :3] @ eye + [0.5, 0.5, _BEFORE * self.reach[2]]
-        return matrix
+
+class Lighting(NamedTuple):
+    """The key light as a picture has it, in view coordinates.
+
+    Parameters
+    ----------
+    towards, zenith : (3,) float64
+        Unit vectors towards the light, and upwards.
+    to_map : (3, 4) float64
+        From places to columns and rows of the shadow map, from the middle of its first texel, and to their closeness to
+        the light [m]: three factors and what is added. Places seem a little closer than they are, or rounding would
+        cast shadows.
+    closeness : (h, w) float32
+        The shadow map: how close to the light what it meets is [m].
+    """
+
+    towards: np.ndarray
+    zenith: np.ndarray
+    to_map: np.ndarray
+    closeness: np.ndarray
 
 
 def key_light(scene: Scene, pixels: int) -> Light:

@@ -14,8 +14,8 @@ from particlesim.trajectory.frames import Header
 # A body: number of its shape, and the factor on that of size 1 [m].
 BODY = record([("shape", "i8"), ("size", "f8")])
 
-# How a shape is drawn, in the order of the shaders' layers: a ball is one sphere; of a faceted one each pixel sees one
-# face; of a rounded shape one offset face, the cylinder about one edge, or the sphere about one vertex.
+# How a shape is drawn: a ball is one sphere; of a faceted one each pixel sees one face; of a rounded shape one offset
+# face, the cylinder about one edge, or the sphere about one vertex.
 BALL, FACETED, ROUNDED = range(3)
 
 

@@ -1,4 +1,4 @@
-#include "common.glsl"
+#version 420 core
 noperspective in float aside;
 flat in float half_width;
 flat in vec4 paint;

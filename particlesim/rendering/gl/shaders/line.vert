@@ -1,4 +1,11 @@
-#include "common.glsl"
+#version 420 core
+// All positions are relative to the eye, along the axes of the world.
+layout(std140, binding = 0) uniform View {
+    mat4 clip_from_eye;
+    vec4 eye;              // xyz [m]
+    vec4 forward;          // xyz: unit vector the camera looks along
+    vec4 viewport;         // width, height [pixels]
+};
 layout(location = 0) in vec3 corner;          // x: 0 at the start, 1 at the end; y: -1 or 1, the side
 layout(location = 1) in vec4 start_width;     // width [pixels]
 layout(location = 2) in vec3 end;
