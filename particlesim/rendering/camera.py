@@ -123,12 +123,11 @@ def _orbit(camera: OrbitCamera, time: float, box: Box, slope: np.ndarray) -> np.
     target = box.middle if camera.target is None else np.asarray(camera.target)
     if camera.distance is not None:
         return _pose(axes, target + camera.distance * axes[:, 2])
-    seen = _swept(box.corners - target) @ _axes(0.0, camera.elevation)
+    rising, falling = _bounds_all_round(box.corners - target, camera.elevation, slope)
     if camera.target is None:
         # Above or below its middle, so that the margins are equal.
-        return _pose(axes, target + axes @ _stand(seen, slope))
-    distance = float((np.abs(seen[:, :2]) / slope + seen[:, 2:]).max())
-    return _pose(axes, target + distance * axes[:, 2])
+        return _pose(axes, target + axes @ _stand(rising, falling, slope))
+    return _pose(axes, target + max(*rising, *falling) * axes[:, 2])
 
 
 def _on_path(camera: PathCamera, time: float) -> tuple[np.ndarray, np.ndarray, float]:
@@ -181,28 +180,34 @@ def _looking(position: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 def _fitted(axes: np.ndarray, points: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """The pose nearest to the points that sees them all, with equal margins left and right, above and below."""
-    return _pose(axes, axes @ _stand(points @ axes, slope))
+    seen = points @ axes
+    rising = (seen[:, :2] / slope + seen[:, 2:]).max(axis=0)
+    falling = (-seen[:, :2] / slope + seen[:, 2:]).max(axis=0)
+    return _pose(axes, axes @ _stand(rising, falling, slope))
 
 
-def _stand(points: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    """Where a camera stands that sees all points (n, 3) and is nearest to them, all in its own axes, (3,).
+def _stand(rising: np.ndarray, falling: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """Where a camera stands that sees all points and is nearest to them, in its own axes, (3,).
 
     A camera at (a, b, d) sees a point (x, y, z) when |x - a| <= slope_x (d - z), and likewise in y. The two sides of
-    each inequality bound d from below by lines in a that rise and fall; they cross at the best a.
+    each inequality bound d from below by lines in a that rise and fall, which start from the largest x / slope_x + z,
+    ``rising``, and -x / slope_x + z, ``falling``, (2,) each; they cross at the best a.
     """
-    rising = (points[:, :2] / slope + points[:, 2:]).max(axis=0)
-    falling = (-points[:, :2] / slope + points[:, 2:]).max(axis=0)
     sideways = 0.5 * slope * (rising - falling)
     return np.array([*sideways, float((0.5 * (rising + falling)).max())])
 
 
-def _swept(points: np.ndarray) -> np.ndarray:
-    """Points (n, 3) that turn about the upright axis through the origin, in many places all the way round."""
-    # As seen by a camera that circles.
-    radius = np.hypot(points[:, 0], points[:, 1])[:, None]
-    angle = np.linspace(0.0, 2.0 * np.pi, 361)
-    height = np.broadcast_to(points[:, 2:], (len(points), len(angle)))
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1).reshape(-1, 3)
+def _bounds_all_round(points: np.ndarray, elevation: float, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What ``_stand`` wants of points (n, 3) that turn about the upright axis through the origin.
+
+    The largest value of a sine and a cosine of one angle, added up, is the root of the sum of their squares.
+    """
+    radius, height = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
+    s, c = np.sin(np.radians(elevation)), np.cos(np.radians(elevation))
+    across = (radius * np.hypot(1.0 / slope[0], c) + height * s).max()
+    up = (radius * abs(c - s / slope[1]) + height * (s + c / slope[1])).max()
+    down = (radius * abs(c + s / slope[1]) + height * (s - c / slope[1])).max()
+    return np.array([across, up]), np.array([across, down])
 
 
 def _near(position: np.ndarray, scene: Scene, box: Box) -> float:
