@@ -9,13 +9,16 @@ from PIL import Image, ImageDraw, ImageFont
 
 # Plate, strong text and faint text in sRGB, for pictures with a dark background and with a light one. The plate lets a
 # little of the picture through.
-_DARK = np.array([[22.0, 25.0, 29.0], [245.0, 245.0, 242.0], [176.0, 180.0, 184.0]])
-_LIGHT = np.array([[252.0, 252.0, 250.0], [24.0, 27.0, 31.0], [96.0, 100.0, 104.0]])
+_DARK = np.array([[22.0, 25.0, 29.0], [245.0, 245.0, 242.0], [176.0, 180.0, 184.0]], dtype=np.float32)
+_LIGHT = np.array([[252.0, 252.0, 250.0], [24.0, 27.0, 31.0], [96.0, 100.0, 104.0]], dtype=np.float32)
 _OPACITY = 0.88
 
 # Height of letters as a fraction of the picture's shorter side, and the least [pixels]: below that they run together.
 _TEXT = 0.026
 _SMALLEST = 12.0
+
+# Texts whose ink is kept: names stay from picture to picture, and so do most values.
+_REMEMBERED = 256
 
 
 class Style:
@@ -25,7 +28,8 @@ class Style:
         self.em = max(_SMALLEST, _TEXT * min(size))  # height of the letters [pixels]
         self.plate, self.strong, self.faint = _DARK if dark else _LIGHT
         self._font = ImageFont.load_default(size=self.em)
-        self.glyph = functools.cache(self._draw_glyph)
+        self._glyph = functools.cache(self._draw_glyph)
+        self.ink = functools.lru_cache(_REMEMBERED)(self._draw_text)
 
     @property
     def margin(self) -> int:
@@ -44,15 +48,26 @@ class Style:
 
     def width(self, text: str) -> int:
         """How wide text is [pixels]."""
-        return sum(self.glyph(letter)[1] for letter in text)
+        return sum(self._glyph(letter)[1] for letter in text)
+
+    def _draw_text(self, text: str) -> np.ndarray:
+        """How much ink text leaves, (h, w) float32 0 .. 1."""
+        glyphs = [self._glyph(letter) for letter in text]
+        tall, wide = (max((mask.shape[axis] for mask, _ in glyphs), default=0) for axis in (0, 1))
+        ink, left = np.zeros((tall, self.width(text) + wide), dtype=np.float32), 0
+        for mask, advance in glyphs:
+            room = ink[:, left : left + mask.shape[1]]
+            np.maximum(room, mask, out=room)
+            left += advance
+        return ink
 
     def _draw_glyph(self, letter: str) -> tuple[np.ndarray, int]:
-        """How much ink a letter leaves, (h, w) 0 .. 1, and how far the next one stands [pixels]."""
+        """How much ink a letter leaves, (h, w) float32 0 .. 1, and how far the next one stands [pixels]."""
         # Whole pixels, and one width for all figures: a number changes in place, nothing else moves.
         advance = round(self._font.getlength("0" if letter.isdigit() else letter))
         tile = Image.new("L", (advance + round(0.3 * self.em), round(1.4 * self.em)))
         ImageDraw.Draw(tile).text((0, 0), letter, fill=255, font=self._font)
-        return np.asarray(tile, dtype=np.float64) / 255.0, advance
+        return np.asarray(tile, dtype=np.float32) / 255.0, advance
 
 
 class Panel:
@@ -61,7 +76,7 @@ class Panel:
     def __init__(self, style: Style, height: int, width: int) -> None:
         self._style = style
         self._colour = np.tile(style.plate, (height, width, 1))
-        self._opacity = np.full((height, width, 1), _OPACITY)
+        self._opacity = np.full((height, width, 1), _OPACITY, dtype=np.float32)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -72,16 +87,12 @@ class Panel:
     def write(self, text: str, left: int, top: int, *, faint: bool = False) -> None:
         """Put text on it; ``left`` and ``top`` [pixels] from its upper left corner."""
         style = self._style
-        ink = style.faint if faint else style.strong
-        for letter in text:
-            mask, advance = style.glyph(letter)
-            rows, columns = slice(top, top + mask.shape[0]), slice(max(left, 0), left + mask.shape[1])
-            room = self._colour[rows, columns]
-            share = mask[: room.shape[0], : room.shape[1], None]
-            room += share * (ink - room)
-            opacity = self._opacity[rows, columns]
-            np.maximum(opacity, share, out=opacity)
-            left += advance
+        ink = style.ink(text)[: self._colour.shape[0] - top, max(-left, 0) : self._colour.shape[1] - left, None]
+        left = max(left, 0)
+        area = slice(top, top + ink.shape[0]), slice(left, left + ink.shape[1])
+        colour, opacity = self._colour[area], self._opacity[area]
+        colour += ink * ((style.faint if faint else style.strong) - colour)
+        np.maximum(opacity, ink, out=opacity)
 
     def fill(self, colour: np.ndarray, left: int, top: int) -> None:
         """Put a patch of sRGB colours (h, w, 3) 0 .. 255 on it, which lets nothing through."""
@@ -94,5 +105,4 @@ class Panel:
         below = image[top : top + self._colour.shape[0], left : left + self._colour.shape[1]]
         height, width = below.shape[:2]
         opacity = self._opacity[:height, :width]
-        blend = (1.0 - opacity) * below + opacity * self._colour[:height, :width]
-        below[:] = np.clip(blend + 0.5, 0.0, 255.0).astype(np.uint8)
+        below[:] = (below + opacity * (self._colour[:height, :width] - below) + 0.5).astype(np.uint8)
