@@ -22,8 +22,8 @@ def no_work(monkeypatch):
     def work(*_, **__):
         raise AssertionError("work was begun")
 
-    for name in ("start", "opened", "Renderer"):
-        monkeypatch.setattr(f"particlesim.jobs.movie.{name}", work)
+    for name in ("movie.start", "movie.opened", "drawers.Renderer"):
+        monkeypatch.setattr(f"particlesim.jobs.{name}", work)
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ makes it, which holds for that code alone; by ``use_threads`` for the whole proc
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -72,20 +73,34 @@ def available_threads() -> int:
     return _limit.get() or _process_limit or (len(affinity(0)) if affinity else os.cpu_count() or 1)
 
 
-# The pool of each number of threads, kept: to start threads for each task takes longer than many a task.
-_pools: dict[int, ThreadPoolExecutor] = {}
+class _Pools(threading.local):
+    """The pools of a thread by their number of threads, kept: to start these takes longer than many a task.
 
-if hasattr(os, "register_at_fork"):  # not every system forks; a child has none of its parent's threads
-    os.register_at_fork(after_in_child=_pools.clear)
+    Each thread has its own: tasks that run at the same time do not wait for each other's.
+    """
+
+    def __init__(self) -> None:
+        self.of: dict[int, ThreadPoolExecutor] = {}
+
+
+_pools = _Pools()
+
+def _forget_pools() -> None:
+    """Let the process have none: a child has none of its parent's threads."""
+    _pools.of.clear()
+
+
+if hasattr(os, "register_at_fork"):  # not every system forks
+    os.register_at_fork(after_in_child=_forget_pools)
 
 
 def _pool_of(threads: int) -> ThreadPoolExecutor | None:
     """The pool of so many threads; None where the calling thread does the work."""
     if threads == 1:
         return None
-    if threads not in _pools:
-        _pools[threads] = ThreadPoolExecutor(threads)
-    return _pools[threads]
+    if threads not in _pools.of:
+        _pools.of[threads] = ThreadPoolExecutor(threads)
+    return _pools.of[threads]
 
 
 class ThreadTeam:

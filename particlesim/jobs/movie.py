@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from particlesim.core.output_path import check_output
+from particlesim.jobs.drawers import Drawers
 from particlesim.jobs.frame_source import (
     FrameSource,
     Progress,
@@ -22,7 +22,7 @@ from particlesim.jobs.frame_source import (
     tell,
 )
 from particlesim.jobs.summary import Summary
-from particlesim.rendering import Renderer, write_image, write_movie
+from particlesim.rendering import write_image, write_movie
 from particlesim.rendering.gl import platform
 from particlesim.rendering.hud.history import History
 from particlesim.rendering.look import look_of
@@ -70,9 +70,8 @@ def simulate(
     check_output(path, ".gsd")
     simulation = start(scene, threads, progress)
     summary = _summary(scene, simulation.header)
-    watch = _Stopwatch(summary)
     with TrajectoryWriter(path, simulation.header) as writer:
-        for _, frame in watch.timed("simulating", frames_of(simulation, scene.frames)):
+        for _, frame in _timed(summary, "simulating", frames_of(simulation, scene.frames)):
             writer.append(frame)
             summary.add(frame)
             tell(progress, "simulating", summary.frames, scene.frames)
@@ -173,48 +172,52 @@ def still(
 
 
 class MovieJob:
-    """Makes the pictures of the frames of a source, as ``scene`` says. A context manager: it holds a Renderer.
+    """Makes the pictures of the frames of a source, as ``scene`` says. A context manager: it holds Drawers.
 
     ``summary``: what the frames that have passed amount to. RenderError if this machine cannot draw.
     """
 
     def __init__(self, source: FrameSource, scene: Scene, progress: Progress | None) -> None:
         self._source, self._movie, self._progress = source, scene.movie, progress
-        self._renderer = Renderer(look_of(scene, source.header, source.first))
+        self._drawers = Drawers(look_of(scene, source.header, source.first), len(source.wanted))
         self.summary = _summary(scene, source.header)
-        self._watch = _Stopwatch(self.summary)
         self.poster = np.zeros((0, 0, 3), dtype=np.uint8)  # of the movie that images() gives
 
     def __enter__(self) -> MovieJob:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._renderer.close()
+    def __exit__(self, *error: Any) -> None:
+        self._drawers.__exit__(*error)
 
     def images(self) -> Iterator[np.ndarray]:
         """The pictures of the movie, (h, w, 3) uint8, with its fades; all frames are taken into account on the way."""
         movie, summary, count = self._movie, self.summary, len(self._source.wanted)
         background = encoded(movie.background)
-        for frame, history in self._wanted():
-            with self._watch.running("drawing"):
-                image = self._renderer.draw(frame, history)
+        for image in self._drawers.draw(self._wanted()):
             # A third of the way in, things have begun to happen.
             if summary.drawn == count // 3:
                 self.poster = image
             seen = strength(summary.drawn, count, movie.fade * movie.fps)
             summary.drawn += 1
+            summary.seconds["drawing"] = self._drawers.seconds
+            self._tell()
             yield faded(image, seen, background)
 
     def _wanted(self) -> Iterator[tuple[Frame, History]]:
         """The frames to draw, each with what its readout needs of those drawn before it."""
         source, summary = self._source, self.summary
         history = History().then(source.first.ledger)
-        for number, frame in self._watch.timed(source.phase, source.frames):
+        for number, frame in _timed(summary, source.phase, source.frames):
+            summary.add(frame)
             if number in source.wanted:
                 yield frame, history
                 history = history.then(frame.ledger)
-            summary.add(frame)
-            tell(self._progress, "rendering", summary.frames, source.total)
+            else:
+                self._tell()
+
+    def _tell(self) -> None:
+        """Say how many frames are done: those that have passed, but for the pictures that are yet to come."""
+        tell(self._progress, "rendering", self.summary.frames - len(self._drawers.waiting), self._source.total)
 
 
 def _summary(scene: Scene, header: Header) -> Summary:
@@ -223,25 +226,13 @@ def _summary(scene: Scene, header: Header) -> Summary:
     return Summary(float(header.mass.sum()), scene.world.gravity, elastic)
 
 
-class _Stopwatch:
-    """Adds up the seconds spent in each part of the work, in ``summary.seconds``."""
-
-    def __init__(self, summary: Summary) -> None:
-        self._seconds = summary.seconds
-
-    @contextmanager
-    def running(self, name: str) -> Iterator[None]:
-        """Count how long the ``with`` block takes."""
+def _timed(summary: Summary, name: str, passing: Iterable[_T]) -> Iterator[_T]:
+    """Pass things on and add up how long they were in coming, in ``summary.seconds``."""
+    source, seconds = iter(passing), summary.seconds
+    while True:
         start = clock.perf_counter()
-        yield
-        self._seconds[name] = self._seconds.get(name, 0.0) + clock.perf_counter() - start
-
-    def timed(self, name: str, passing: Iterable[_T]) -> Iterator[_T]:
-        """Pass things on and count how long each was in coming."""
-        source = iter(passing)
-        while True:
-            with self.running(name):
-                thing = next(source, None)
-            if thing is None:
-                return
-            yield thing
+        thing = next(source, None)
+        seconds[name] = seconds.get(name, 0.0) + clock.perf_counter() - start
+        if thing is None:
+            return
+        yield thing

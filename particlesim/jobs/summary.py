@@ -28,7 +28,7 @@ class Summary:
         self.frames = 0
         self.drawn = 0  # how many of the frames there are pictures of
         self.largest_overlap = 0.0
-        self.seconds: dict[str, float] = {}
+        self.seconds: dict[str, float] = {}  # spent in each part, but for what was done beside another
 
     def add(self, frame: Frame) -> None:
         """Take a frame into account."""

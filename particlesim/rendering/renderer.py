@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 
 import numpy as np
@@ -22,7 +21,7 @@ from particlesim.rendering.shading.lighting import key_light
 from particlesim.rendering.shading.shade import Paint, Seen, seen_instances, shade
 from particlesim.rendering.visibility.geometry_tables import geometry_tables
 from particlesim.rendering.visibility.instances import Instances, instances_of
-from particlesim.rendering.visibility.occlusion_clusters import OcclusionClusters, occlusion_clusters
+from particlesim.rendering.visibility.occlusion_clusters import occlusion_clusters
 from particlesim.rendering.visibility.projection import Projection
 from particlesim.rendering.visibility.rasterise import rasterise
 from particlesim.trajectory.frames import Frame
@@ -42,7 +41,6 @@ class Renderer:
         found = platform.choose()
         self._bridge = bridge = platform.open_bridge(found)
         self._look, scene = look, look.scene
-        self._beside = ThreadPoolExecutor(1)
         self._quality = quality = PRESETS[scene.movie.quality]
         self._size = scene.movie.size
         self._drawn_size = (quality.samples * self._size[0], quality.samples * self._size[1])
@@ -68,7 +66,6 @@ class Renderer:
 
     def close(self) -> None:
         """Give back the OpenGL context. The renderer is of no use afterwards."""
-        self._beside.shutdown()
         self._canvas.close()
 
     def draw(self, frame: Frame, history: History | None = None) -> np.ndarray:
@@ -90,11 +87,10 @@ class Renderer:
         clusters = occlusion_clusters(instances.position, instances.tables.radius)
         projection = self._projection(view)
         buffer = rasterise(projection, instances, clusters)
-        # While the shadow map is made, it is found what is seen: that leaves a core idle now and then.
-        shadow = self._beside.submit(self._shadow_map, instances, clusters)
+        shadow = rasterise(self._light.projection, instances, clusters)
         paint = self._paint(view, frame, instances, seen_instances(buffer, len(instances.position)))
         self._put_lines(view, frame)
-        lighting = self._light.in_view(projection, shadow.result())
+        lighting = self._light.in_view(projection, shadow.inverse_depth)
         ground = self._environment.ground(self._floor_light(instances))
         colours = shade(projection, buffer, instances, paint, lighting, ground)
         depth = 1.0 - np.float32(view.near) * buffer.inverse_depth
@@ -122,10 +118,6 @@ class Renderer:
         if self._floor is not None:
             return self._floor.light(instances.position, instances.source)
         return np.ones((2, 2) if self._environment.has_floor else (0, 0), dtype=np.float32)
-
-    def _shadow_map(self, instances: Instances, clusters: OcclusionClusters) -> np.ndarray:
-        """The shadow map: closeness to the key light of the surface that it shines on, (h, w) float32 [m]."""
-        return rasterise(self._light.projection, instances, clusters).inverse_depth
 
     def _put_lines(self, view: View, frame: Frame) -> None:
         """The edges of the world and, if they are shown, of the octree's cells."""
