@@ -58,7 +58,12 @@ WRONG = [
     (["--still", "1", "--every", "2"], "--every: of a movie, not of the one picture that --still asks for"),
     (["--still", "1", "-o", "a.mp4"], "a.mp4: the output must end in .png"),
     (["--size", "12"], "--size 12: must be WIDTHxHEIGHT in pixels, such as 1280x720"),
-    (["--size", "65x64"], "--size 65x64: must be [width, height] in pixels, two even whole numbers from 64 to 7680"),
+    (
+        ["--size", "321x64"],
+        "--size 321x64: must be [width, height] in pixels, two even whole numbers from 64 to 7680; "
+        "the nearest are 322 and 64",
+    ),
+    (["--size", "9x64"], "--size 9x64: must be [width, height] in pixels, two even whole numbers from 64 to 7680"),
     (["--quality", "hihg"], "--quality hihg: must be 'draft', 'normal' or 'high'; did you mean 'high'?"),
     (["--camera", "orbital"], "--camera: camera = \"orbital\": unknown kind; did you mean 'orbit'?"),
     (["--camera", "{kind = 'look-at'}"], "--camera: camera: the key 'position' is missing"),

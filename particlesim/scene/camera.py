@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, WrapValidator, model_validator
 
 from particlesim.scene.base import (
     Colour,
@@ -128,10 +129,24 @@ def _even(value: int) -> int:
     return value
 
 
-Pixels = Annotated[int, Field(ge=64, le=7680), whole, AfterValidator(_even)]
-Resolution = Annotated[
-    tuple[Pixels, Pixels], must_be("[width, height] in pixels, two even whole numbers from 64 to 7680")
-]
+_LEAST, _MOST = 64, 7680
+Pixels = Annotated[int, Field(ge=_LEAST, le=_MOST), whole, AfterValidator(_even)]
+
+
+def _sizes(value: Any, accept: Callable[[Any], Any]) -> Any:
+    """Refuse what is no size in one line; if it is no more than odd, with the nearest that is even."""
+    try:
+        return accept(value)
+    except ValidationError:
+        what = f"must be [width, height] in pixels, two even whole numbers from {_LEAST} to {_MOST}"
+        if isinstance(value, list | tuple) and len(value) == 2 and all(type(n) is int for n in value):
+            width, height = (n + n % 2 for n in value)
+            if min(width, height) >= _LEAST and max(width, height) <= _MOST:
+                what += f"; the nearest are {width} and {height}"
+        raise ValueError(what) from None
+
+
+Resolution = Annotated[tuple[Pixels, Pixels], WrapValidator(_sizes)]
 Quality = Annotated[Literal["draft", "normal", "high"], one_of("draft", "normal", "high")]
 
 # Width and height of pictures that do not say theirs [pixels].
