@@ -67,9 +67,9 @@ def probed(monkeypatch):
         monkeypatch.setattr(platform, "_probe", lambda source: answers.get(source, "not installed"))
 
     monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
-    platform.choose.cache_clear()
+    platform._found.cache_clear()
     yield pretend
-    platform.choose.cache_clear()
+    platform._found.cache_clear()
 
 
 def test_importing_the_renderer_is_cheap():
@@ -126,9 +126,50 @@ def test_the_environment_decides_if_it_is_set(probed, monkeypatch):
     probed(egl=found("egl"), lavavu_osmesa=found("lavavu-osmesa"))
     monkeypatch.setenv("PYOPENGL_PLATFORM", "osmesa")
     assert platform.choose().source == "lavavu-osmesa"
-    platform.choose.cache_clear()
+    platform._found.cache_clear()
     probed(osmesa=found("osmesa"))
     assert "as PYOPENGL_PLATFORM says" in platform.describe()
+
+
+FORK = """
+import multiprocessing
+import sys
+
+def drawn():
+    try:
+        with Renderer(look_of(scene, header, frame)) as renderer:
+            return renderer.draw(frame).std() > 0.0
+    except RenderError as error:
+        return str(error)
+
+def say(draw):
+    print(draw(), flush=True)
+
+def child(draw):
+    process = multiprocessing.get_context("fork").Process(target=say, args=(draw,))
+    process.start()
+    process.join()
+
+child(drawn)
+print(drawn(), flush=True)
+child(drawn)
+with Renderer(look_of(scene, header, frame)) as open_before:
+    def again():
+        try:
+            return open_before.draw(frame).std() > 0.0
+        except RenderError as error:
+            return str(error)
+    child(again)
+"""
+
+
+def test_a_fork_draws_unless_something_has_been_drawn_before_it():
+    code = DRAW[: DRAW.index("try:")] + FORK
+    child = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
+    before, here, after, handed_down = child.stdout.splitlines()
+    assert (before, here) == ("True", "True")
+    assert after == handed_down and after.startswith("cannot draw in a fork of a process that has drawn")
+    assert "'spawn' or 'forkserver'" in after
 
 
 def test_a_driver_that_crashes_takes_only_the_probe_with_it(monkeypatch, tmp_path):

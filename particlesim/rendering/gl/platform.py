@@ -42,7 +42,22 @@ class Platform:
         return SOURCES[self.source]
 
 
-@functools.cache
+# The process that has drawn, if any has: this one, or one that it was forked from.
+_drawn_in: int | None = None
+
+
+def check_process() -> None:
+    """RenderError in a fork of a process that has drawn.
+
+    A driver's threads are not there in a fork, and what waits for them does so for ever.
+    """
+    if _drawn_in not in (None, os.getpid()):
+        raise RenderError(
+            "cannot draw in a fork of a process that has drawn: start it by 'spawn' or 'forkserver' "
+            "(multiprocessing.get_context), or fork it before anything is drawn"
+        )
+
+
 def choose() -> Platform:
     """The platform to draw with: the first that opens a context of those that PYOPENGL_PLATFORM allows, if it is set.
 
@@ -51,8 +66,14 @@ def choose() -> Platform:
     Raises
     ------
     RenderError
-        In one line with the remedy, if none works.
+        In one line with the remedy, if none works, or if this process cannot draw since another has.
     """
+    check_process()
+    return _found()
+
+
+@functools.cache
+def _found() -> Platform:
     reasons: list[str] = []
     for source in _allowed():
         found = _probe(source)
@@ -76,6 +97,8 @@ def _allowed() -> list[str]:
 
 def open_bridge(found: Platform) -> Any:
     """The module that draws, with PyOpenGL on the platform found. RenderError if it cannot be imported."""
+    global _drawn_in  # noqa: PLW0603  (what becomes of a process cannot be undone)
+    _drawn_in = os.getpid()
     # PyOpenGL reads the platform here, at its first import and never again.
     os.environ["PYOPENGL_PLATFORM"] = found.name
     try:

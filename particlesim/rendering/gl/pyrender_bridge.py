@@ -18,7 +18,7 @@ import numpy as np
 
 from particlesim.rendering.errors import RenderError
 from particlesim.rendering.gl.geometry import STRIP
-from particlesim.rendering.gl.platform import Platform
+from particlesim.rendering.gl.platform import Platform, check_process
 
 # pyrender's window needs pyglet, and pyglet needs X libraries; nothing here opens a window.
 _viewer = types.ModuleType("pyrender.viewer")
@@ -200,6 +200,7 @@ class Canvas:
 
     def draw(self, picture: Picture) -> np.ndarray:
         """The picture, (height, width, 4) uint8 sRGB; as always in OpenGL, its first row is the lowest."""
+        check_process()
         self._context.make_current()
         self._renderer.picture = picture
         return self._renderer.render(self._scene, RenderFlags.OFFSCREEN)
