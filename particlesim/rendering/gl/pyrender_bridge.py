@@ -8,6 +8,7 @@ module only after ``platform.choose``: PyOpenGL takes its platform when imported
 from __future__ import annotations
 
 import ctypes
+import importlib.util
 import sys
 import types
 from dataclasses import dataclass
@@ -24,6 +25,26 @@ from particlesim.rendering.gl.platform import Platform, check_process
 _viewer = types.ModuleType("pyrender.viewer")
 _viewer.Viewer = None  # type: ignore[attr-defined]
 sys.modules.setdefault("pyrender.viewer", _viewer)
+
+
+def _put_off(name: str) -> None:
+    """Let a package be imported when something of it is first asked for, and modules in it without the rest."""
+    spec = importlib.util.find_spec(name)
+    if name in sys.modules or spec is None or spec.loader is None:
+        return
+    package, load = importlib.util.module_from_spec(spec), spec.loader.exec_module
+
+    def fetch(attribute: str) -> Any:
+        package.__dict__.pop("__getattr__", None)
+        load(package)
+        return getattr(package, attribute)
+
+    package.__getattr__ = fetch  # type: ignore[method-assign]
+    sys.modules[name] = package
+
+
+# For meshes, of which there are none here, pyrender imports trimesh, and that half of scipy: most of a second.
+_put_off("trimesh")
 
 import OpenGL.error  # noqa: E402
 import pyrender  # noqa: E402
