@@ -11,6 +11,7 @@ from particlesim.rendering.shading.faces_in_view import faces_in_view
 from particlesim.rendering.shading.lighting import Light, Lighting
 from particlesim.rendering.shading.shade import Paint, seen_instances, shade
 from particlesim.rendering.shading.shade_floor import Ground
+from particlesim.rendering.shading.shadow import shadow_map
 from particlesim.rendering.visibility.occlusion_clusters import occlusion_clusters
 from particlesim.rendering.visibility.rasterise import VisibilityBuffer, rasterise
 from tests.sight import KINDS, crowd, onto, projection, rays, through
@@ -24,8 +25,8 @@ NO_FLOOR = Ground(np.array([BACKGROUND] * 3), np.array([3.0, 3.0, -3.0, 1.0]), n
 
 def lighting(closeness):
     """Light of which all or nothing arrives, as the one number on its map says."""
-    zenith, shadow_map = np.ascontiguousarray(VIEW.axes[:, 2]), np.full((9, 9), closeness, np.float32)
-    return Lighting(VIEW.axes @ TOWARDS, zenith, np.zeros((3, 4)), shadow_map)
+    zenith, shadow = np.ascontiguousarray(VIEW.axes[:, 2]), shadow_map(np.full((9, 9), closeness, np.float32))
+    return Lighting(VIEW.axes @ TOWARDS, zenith, np.zeros((3, 4)), shadow)
 
 
 def shaded(particles, light, ground=NO_FLOOR, view=VIEW):
@@ -207,24 +208,46 @@ def test_the_floor_has_its_colours_and_fades_into_the_background():
 # ---- shadows ------------------------------------------------------------------------------------------------------
 
 
-def test_shadows_lie_where_rays_to_the_light_are_stopped():
-    balls = crowd(3, 60, 4.0, 0.4, 0.9, kinds=1)
+def sun(pixels):
+    """A light whose map has ``pixels`` a side, each of 10 m / pixels."""
     right = np.cross([0.0, 0.0, 1.0], TOWARDS)
     right /= np.linalg.norm(right)
-    light = Light(TOWARDS, np.array([right, np.cross(TOWARDS, right), -TOWARDS]), np.array([5.0, 5.0, 5.0]), (800, 800))
-    closeness = rasterise(light.projection, *balls.scene).inverse_depth
+    axes = np.array([right, np.cross(TOWARDS, right), -TOWARDS])
+    return Light(TOWARDS, axes, np.array([5.0, 5.0, 5.0]), (pixels, pixels))
+
+
+@pytest.mark.parametrize("pixels", [800, 200])
+def test_shadows_lie_where_rays_to_the_light_are_stopped_with_edges_as_soft_as_three_texels(pixels):
+    balls = crowd(3, 60, 4.0, 0.4, 0.9, kinds=1)
+    view = projection((9.0, 3.0, 4.0), scale=240.0, size=(332, 244))
+    light, texel = sun(pixels), 10.0 / pixels
+    shadow = shadow_map(rasterise(light.projection, *balls.scene).inverse_depth)
     white, black = np.ones(3), np.zeros(3)
     ground = Ground(np.array([[0.5] * 3, white, black]), np.array([4.0, 4.0, -2.5, 0.5]), np.ones((2, 2), np.float32))
-    image, buffer, _ = shaded(balls, light.in_view(VIEW, closeness), ground)
-    place, _ = on_floor(VIEW, ground)
-    # From each place on the floor, how far the ray to the light passes inside the nearest ball, in radii.
-    arm = balls.position - place[..., None, :]
-    off = np.linalg.norm(arm - (arm @ TOWARDS)[..., None] * TOWARDS, axis=-1) - 0.5 * balls.size
-    off = off.min(axis=-1)
+    image, buffer, _ = shaded(balls, light.in_view(view, shadow), ground, view)
+    place, _ = on_floor(view, ground)
+    # From each place on the floor, how far the ray to the light passes inside the nearest ball.
+    off = np.full(place.shape[:2], np.inf)
+    for centre, size in zip(balls.position, balls.size, strict=True):
+        arm = centre - place
+        off = np.minimum(off, np.linalg.norm(arm - (arm @ TOWARDS)[..., None] * TOWARDS, axis=-1) - 0.5 * size)
     floor = (buffer.id < 0) & (np.abs(place[..., :2]) < ground.area[:2]).all(axis=-1)
-    assert (image[..., 0][floor & (off > 0.04)] > 0.99).all()
-    assert (image[..., 0][floor & (off < -0.04)] < 0.01).all()
-    assert (floor & (off < -0.04)).sum() > 100 and (floor & (off > 0.04)).sum() > 100
+    lit, reach = image[..., 0], 1.5 * np.sqrt(2.0) * texel + 0.7 * texel
+    assert (lit[floor & (off > reach)] > 0.99).all() and (lit[floor & (off < -reach)] < 0.01).all()
+    assert (floor & (off < -reach)).sum() > 500 and (floor & (off > reach)).sum() > 500
+    # Half way through the edge half of the light arrives.
+    middle = lit[floor & (np.abs(off) < 0.25 * texel)]
+    assert len(middle) > 30 and middle.mean() == pytest.approx(0.5, abs=0.1) and middle.std() < 0.2
+    inner, outer = (lit[floor & (np.abs(off - side * 0.8 * texel) < 0.3 * texel)].mean() for side in (-1, 1))
+    assert 0.05 < inner < 0.4 and 0.6 < outer < 0.95
+
+
+def test_texels_looked_at_are_bounded_by_the_least_and_the_most_of_them():
+    closeness = np.random.default_rng(8).normal(size=(40, 33)).astype(np.float32)
+    found = shadow_map(closeness)
+    around = np.lib.stride_tricks.sliding_window_view(closeness, (4, 4))
+    assert np.array_equal(found.least[:-3, :-3], around.min(axis=(2, 3)))
+    assert np.array_equal(found.most[:-3, :-3], around.max(axis=(2, 3)))
 
 
 # ---- threads and clusters -----------------------------------------------------------------------------------------

@@ -19,6 +19,7 @@ from particlesim.rendering.shading.floor import FloorOcclusion
 from particlesim.rendering.shading.fxaa import fxaa
 from particlesim.rendering.shading.lighting import key_light
 from particlesim.rendering.shading.shade import Paint, Seen, seen_instances, shade
+from particlesim.rendering.shading.shadow import shadow_map
 from particlesim.rendering.visibility.geometry_tables import geometry_tables
 from particlesim.rendering.visibility.instances import Instances, instances_of
 from particlesim.rendering.visibility.occlusion_clusters import occlusion_clusters
@@ -47,7 +48,8 @@ class Renderer:
         self._environment = environment = Environment(scene)
         self._overlay = Overlay(look, environment.dark)
         self._tables = tables = geometry_tables(look.header)
-        self._light = key_light(scene, round(quality.shadow * self._size[1]))
+        usual = float(np.median(tables.radius)) if len(tables.radius) else 0.0
+        self._light = key_light(scene, round(quality.shadow * self._size[1]), usual)
         self._ambient_occlusion = (
             AmbientOcclusion(np.asarray(scene.world.size), tables.radius) if quality.ambient_occlusion else None
         )
@@ -87,10 +89,10 @@ class Renderer:
         clusters = occlusion_clusters(instances.position, instances.tables.radius)
         projection = self._projection(view)
         buffer = rasterise(projection, instances, clusters)
-        shadow = rasterise(self._light.projection, instances, clusters)
+        shadow = shadow_map(rasterise(self._light.projection, instances, clusters).inverse_depth)
         paint = self._paint(view, frame, instances, seen_instances(buffer, len(instances.position)))
         self._put_lines(view, frame)
-        lighting = self._light.in_view(projection, shadow.inverse_depth)
+        lighting = self._light.in_view(projection, shadow)
         ground = self._environment.ground(self._floor_light(instances))
         colours = shade(projection, buffer, instances, paint, lighting, ground)
         depth = 1.0 - np.float32(view.near) * buffer.inverse_depth

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.rendering.camera import light_azimuth
+from particlesim.rendering.shading.shadow import SQUARES, ShadowMap
 from particlesim.rendering.visibility.projection import Projection
 from particlesim.scene import Scene
 
@@ -15,6 +16,12 @@ _ELEVATION = 58.0
 
 # What is behind another by less than this share of the depth of the box is not in its shadow.
 _BEFORE = 1.2e-3
+
+# How wide the soft edge of a shadow is at the least, in radii of a particle: what is far smaller looks like a texture.
+_PENUMBRA = 0.3
+
+# Texels of its shorter side at the least: what is looked at about one place has to be there.
+_FEWEST = 8
 
 # The box is a little larger than the world, for what leans out of it.
 _ROOM = 1.04
@@ -36,12 +43,14 @@ class Light(NamedTuple):
         """The projection of the shadow map."""
         return Projection(self.axes, np.zeros(3), True, self.pixels[0] / (2.0 * self.reach[0]), self.pixels)
 
-    def in_view(self, view: Projection, closeness: np.ndarray) -> Lighting:
-        """The light on what ``view`` shows; ``closeness`` (h, w) float32 [m]: the shadow map."""
+    def in_view(self, view: Projection, shadow: ShadowMap) -> Lighting:
+        """The light on what ``view`` shows."""
         texels = self.projection.scale
         to_map = (self.axes * [[texels], [texels], [-1.0]]) @ np.column_stack([view.axes.T, view.eye])
-        to_map[:, 3] += 0.5 * self.pixels[0] - 0.5, 0.5 * self.pixels[1] - 0.5, _BEFORE * self.reach[2]
-        return Lighting(view.axes @ self.towards, np.ascontiguousarray(view.axes[:, 2]), to_map, closeness)
+        # To the first of the texels that are looked at, from its middle.
+        first = 0.5 * np.asarray(self.pixels) - 0.5 * SQUARES
+        to_map[:, 3] += *first, _BEFORE * self.reach[2]
+        return Lighting(view.axes @ self.towards, np.ascontiguousarray(view.axes[:, 2]), to_map, shadow)
 
 
 class Lighting(NamedTuple):
@@ -52,28 +61,30 @@ class Lighting(NamedTuple):
     towards, zenith : (3,) float64
         Unit vectors towards the light, and upwards.
     to_map : (3, 4) float64
-        From places to columns and rows of the shadow map, from the middle of its first texel, and to their closeness to
-        the light [m]: three factors and what is added. Places seem a little closer than they are, or rounding would
-        cast shadows.
-    closeness : (h, w) float32
-        The shadow map: how close to the light what it meets is [m].
+        From places to columns and rows of the shadow map where the texels that are looked at begin, and to their
+        closeness to the light [m]: three factors and what is added. Places seem a little closer than they are, or
+        rounding would cast shadows.
+    shadow : ShadowMap
     """
 
     towards: np.ndarray
     zenith: np.ndarray
     to_map: np.ndarray
-    closeness: np.ndarray
+    shadow: ShadowMap
 
 
-def key_light(scene: Scene, pixels: int) -> Light:
-    """The light of a scene, with a shadow map of ``pixels`` along its longer side."""
+def key_light(scene: Scene, pixels: int, radius: float = 0.0) -> Light:
+    """The light of a scene, with a shadow map of up to ``pixels`` along its longer side.
+
+    ``radius`` of a usual particle [m]: where it is large, so are the texels.
+    """
     a, e = np.radians([light_azimuth(scene), _ELEVATION])
     towards = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
     right = np.array([-np.sin(a), np.cos(a), 0.0])
     axes = np.array([right, np.cross(towards, right), -towards])
     reach = _ROOM * np.abs(axes) @ (0.5 * np.asarray(scene.world.size))
     # Texels are squares in the world: the shorter side has fewer of them, and reaches as far as whole ones do.
-    texel = 2.0 * max(reach[:2]) / pixels
-    sides = np.ceil(2.0 * reach[:2] / texel - 1e-9).astype(int)
+    texel = max(2.0 * max(reach[:2]) / pixels, _PENUMBRA * radius / SQUARES)
+    sides = np.maximum(np.ceil(2.0 * reach[:2] / texel - 1e-9).astype(int), _FEWEST)
     reach[:2] = 0.5 * texel * sides
     return Light(towards, axes, reach, (int(sides[0]), int(sides[1])))
