@@ -225,7 +225,10 @@ BROKEN = [
     ("seed = -1\n" + GOOD, "seed = -1: must be a whole number from 0 to 2^63 - 1"),
     ("title = 3\n" + GOOD, "title = 3: must be text in quotes"),
     (GOOD + "[movie]\nfps = 0\n", "movie.fps = 0: must be a number of frames a second from 1 to 240"),
-    (GOOD + "[movie]\nresolution = [1281, 720]\n", f"movie.resolution = [1281, 720]: {PIXELS}; the nearest are 1282 and 720"),
+    (
+        GOOD + "[movie]\nresolution = [1281, 720]\n",
+        f"movie.resolution = [1281, 720]: {PIXELS}; the nearest are 1282 and 720",
+    ),
     (
         GOOD + '[movie]\nquality = "hihg"\n',
         "movie.quality = \"hihg\": must be 'draft', 'normal' or 'high'; did you mean 'high'?",

@@ -85,6 +85,7 @@ class _Pools(threading.local):
 
 _pools = _Pools()
 
+
 def _forget_pools() -> None:
     """Let the process have none: a child has none of its parent's threads."""
     _pools.of.clear()
