@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
-from particlesim.core.math3d import axpy, cross, dot, load_vec3, norm, scale, set_vec3, store_vec3, sub, to_vec3
+from particlesim.core.math3d import axpy, cross, dot, load_vec3, norm, scale, set_vec3, store_vec3, sub
 from particlesim.core.parallel import ThreadTeam
 from particlesim.core.records import record
 from particlesim.rendering.visibility.instances import Instances
 from particlesim.rendering.visibility.projection import Projection
-from particlesim.rendering.visibility.scan_lines import rotated, view_rotation
+from particlesim.rendering.visibility.scan_lines import in_view, rotated, view_rotation
 
 # A face: its unit normal in view coordinates, the cosine by which its body is turned to the eye with it, and its edges:
 # rows first:last of FacesInView.edge.
@@ -74,13 +74,6 @@ def _fill(which, indices, faces, first_edge, world, strip, view):
             centre = in_view(strip, load_vec3(position, i))
             placed = body.shape, body.size, centre, view_rotation(strip.axes, orientation, i)
             _fill_polyhedron(placed, tables.shapes, strip.scale, first_edge[k], view, view.start[k])
-
-
-@kernel
-def in_view(strip, v):
-    """A place in view coordinates."""
-    v = sub(v, to_vec3(strip.eye))
-    return dot(to_vec3(strip.axes[0]), v), dot(to_vec3(strip.axes[1]), v), dot(to_vec3(strip.axes[2]), v)
 
 
 @kernel

@@ -14,7 +14,7 @@ import numpy as np
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import axpy, load_vec3, norm, scale, sub
 from particlesim.core.parallel import ThreadTeam
-from particlesim.rendering.shading.faces_in_view import faces_in_view, in_view
+from particlesim.rendering.shading.faces_in_view import faces_in_view
 from particlesim.rendering.shading.lighting import Lighting
 from particlesim.rendering.shading.pixel_row import PixelRow, row_buffers
 from particlesim.rendering.shading.shade_face import find_rim, shade_face
@@ -25,7 +25,7 @@ from particlesim.rendering.visibility.geometry_tables import BALL, FACETED, draw
 from particlesim.rendering.visibility.instances import Instances
 from particlesim.rendering.visibility.projection import Projection
 from particlesim.rendering.visibility.rasterise import VisibilityBuffer
-from particlesim.rendering.visibility.scan_lines import rotated, view_rotation
+from particlesim.rendering.visibility.scan_lines import in_view, rotated, view_rotation
 
 _NOWHERE = 0.0, 0.0, 0.0
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
+from particlesim.core.math3d import load_vec3
 from particlesim.core.parallel import ThreadTeam
 from particlesim.rendering.visibility.depth_tiles import TILE, any_farther, depth_tiles, is_hidden, mark_stale
 from particlesim.rendering.visibility.geometry_tables import BALL, FACETED, drawn_as
@@ -27,7 +28,7 @@ from particlesim.rendering.visibility.rasterise_polyhedron import (
 )
 from particlesim.rendering.visibility.rasterise_rounded import rasterise_rounded, rasterise_rounded_shadow
 from particlesim.rendering.visibility.rasterise_sphere import rasterise_disc, rasterise_near_sphere, rasterise_sphere
-from particlesim.rendering.visibility.scan_lines import scratch_for, view_rotation
+from particlesim.rendering.visibility.scan_lines import in_view, scratch_for, view_rotation
 from particlesim.rendering.visibility.screen_bounds import outside_frustum, screen_box, whole_strip
 
 
@@ -101,7 +102,7 @@ def _rasterise_strip(order, middle, reach, world, strip, scratch, buffer, tiles)
 @kernel
 def _rasterise_instance(k, world, strip, scratch, buffer, tiles):
     clusters, orientation, body, shapes = world
-    centre, radius, i = _in_view(clusters.sphere, k, strip), clusters.sphere[k, 3], clusters.indices[k]
+    centre, radius, i = in_view(strip, load_vec3(clusters.sphere, k)), clusters.sphere[k, 3], clusters.indices[k]
     near = not strip.parallel and centre[2] <= radius
     if near:
         # Any pixel may see some of it, but for what is behind or out of the picture altogether.
@@ -125,18 +126,6 @@ def _rasterise_instance(k, world, strip, scratch, buffer, tiles):
         else:
             rasterise_rounded(i, placed, shapes, strip, box, scratch, buffer)
     mark_stale(tiles, box)
-
-
-@kernel
-def _in_view(sphere, k, strip):
-    """The centre of sphere ``k`` in view coordinates."""
-    axes, eye = strip.axes, strip.eye
-    a, b, c = sphere[k, 0] - eye[0], sphere[k, 1] - eye[1], sphere[k, 2] - eye[2]
-    return (
-        axes[0, 0] * a + axes[0, 1] * b + axes[0, 2] * c,
-        axes[1, 0] * a + axes[1, 1] * b + axes[1, 2] * c,
-        axes[2, 0] * a + axes[2, 1] * b + axes[2, 2] * c,
-    )
 
 
 @kernel

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import load_quat, mat_transposed_vec, quat_to_matrix, to_vec3
+from particlesim.core.math3d import dot, load_quat, mat_transposed_vec, quat_to_matrix, sub, to_vec3
 from particlesim.geometry.shape_table import ShapeTable
 from particlesim.rendering.visibility.screen_bounds import integer_range
 
@@ -66,6 +66,13 @@ def scratch_for(shapes: ShapeTable) -> Scratch:
         edge_seen=np.empty(e, np.bool_),
         vertex_seen=np.empty(v, np.bool_),
     )
+
+
+@kernel
+def in_view(strip, v):
+    """A place in view coordinates."""
+    v = sub(v, to_vec3(strip.eye))
+    return dot(to_vec3(strip.axes[0]), v), dot(to_vec3(strip.axes[1]), v), dot(to_vec3(strip.axes[2]), v)
 
 
 @kernel
