@@ -7,6 +7,9 @@ CAPSULE = 1
 POLYHEDRON = 2
 HALF_SPACE = 3
 
+# Metres in the units of length that a mesh file may be in.
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
+
 # What happens to a particle at the two faces of the domain that bound an axis.
 WALL = 0
 PERIODIC = 1

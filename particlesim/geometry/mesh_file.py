@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-# Metres in the units of length that a mesh may be in; the files do not say theirs.
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
+from particlesim.core.constants import UNITS
 
 # A binary STL: a header, the number of its triangles (uint32), and so many bytes for each of them
 # (https://www.loc.gov/preservation/digital/formats/fdd/fdd000505.shtml).

@@ -15,6 +15,7 @@ from pydantic import (
     model_validator,
 )
 
+from particlesim.core.constants import UNITS
 from particlesim.core.polyhedra import POLYHEDRA
 from particlesim.scene.base import (
     MAX_COUNT,
@@ -84,7 +85,8 @@ class PyramidShape(Model):
 
 
 # What the numbers of a mesh file are in, which the file does not say.
-_Unit = Annotated[Literal["m", "cm", "mm", "um", "in"], one_of("m", "cm", "mm", "um", "in")]
+_AnyUnit: Any = Literal.__getitem__(tuple(UNITS))
+_Unit = Annotated[_AnyUnit, one_of(*UNITS)]
 
 
 class MeshShape(Model):
