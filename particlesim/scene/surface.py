@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -16,13 +16,25 @@ TangentialRestitution = Annotated[PlainFloat, Field(ge=-1, le=1), must_be("a num
 Two = Annotated[tuple[Text, Text], must_be(f"the names of two groups, or of one and '{WALLS}', such as ['a', 'b']")]
 
 
-def check_static(friction: float | None, static_friction: float | None) -> None:
-    """ValueError if a table gives a static friction below its friction."""
-    if None not in (friction, static_friction) and float(static_friction or 0.0) < float(friction or 0.0):
-        raise ValueError(f"static_friction is {static_friction:g}, but must not be below friction, {friction:g}")
+class HasSurface(Model):
+    """Base of the tables that have the keys of ``Surface``, whatever stands for those that are not given."""
+
+    @model_validator(mode="after")
+    def _static_is_not_below(self) -> Self:
+        friction, static = (self.surface.get(name) for name in ("friction", "static_friction"))
+        if friction is not None and static is not None and static < friction:
+            raise ValueError(f"static_friction is {static:g}, but must not be below friction, {friction:g}")
+        return self
+
+    @property
+    def surface(self) -> dict[str, float]:
+        """Which of its keys have a value. Friction alone is static friction too."""
+        values = {name: getattr(self, name) for name in Surface.model_fields}
+        given = {name: value for name, value in values.items() if value is not None}
+        return {"static_friction": given["friction"], **given} if "friction" in given else given
 
 
-class Surface(Model):
+class Surface(HasSurface):
     """How a surface takes impacts and sliding; what is not given is as it would be without the table."""
 
     restitution: Fraction | None = None
@@ -30,17 +42,6 @@ class Surface(Model):
     static_friction: NotNegative | None = None  # and until they do; the friction if only that is given
     rolling_friction: NotNegative | None = None  # [m]; the torque is at most this times the normal force
     tangential_restitution: TangentialRestitution | None = None  # of impacts that stick, Walton's beta_0
-
-    @model_validator(mode="after")
-    def _static_is_not_below(self) -> Surface:
-        check_static(self.friction, self.static_friction)
-        return self
-
-    @property
-    def surface(self) -> dict[str, float]:
-        """Which of its keys are given. Friction alone is static friction too."""
-        given = {name: getattr(self, name) for name in Surface.model_fields if getattr(self, name) is not None}
-        return {"static_friction": given["friction"], **given} if "friction" in given else given
 
 
 class Contact(Surface):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
 from particlesim.scene.base import (
     Fraction,
@@ -17,7 +17,7 @@ from particlesim.scene.base import (
     whole,
 )
 from particlesim.scene.messages import hint, listed, must_be
-from particlesim.scene.surface import TangentialRestitution, check_static
+from particlesim.scene.surface import HasSurface, TangentialRestitution
 
 Boundary = Literal["wall", "periodic", "open"]
 _BOUNDARIES = "wall", "periodic", "open"
@@ -35,7 +35,7 @@ def _for_each_axis(value: Any) -> Any:
     return words
 
 
-class World(Model):
+class World(HasSurface):
     """A box of ``size`` [m] about the origin."""
 
     size: PositiveVector
@@ -49,18 +49,6 @@ class World(Model):
     static_friction: NotNegative | None = None  # and until they do; the friction if not given
     rolling_friction: NotNegative = 0.0  # [m]; the torque is at most this times the normal force
     tangential_restitution: TangentialRestitution = 0.0  # of impacts that stick, Walton's beta_0
-
-    @model_validator(mode="after")
-    def _static_is_not_below(self) -> World:
-        check_static(self.friction, self.static_friction)
-        return self
-
-    @property
-    def surface(self) -> dict[str, float]:
-        """The surface of the walls, and of what does not say."""
-        static = self.friction if self.static_friction is None else self.static_friction
-        names = "restitution", "friction", "rolling_friction", "tangential_restitution"
-        return {**{name: getattr(self, name) for name in names}, "static_friction": static}
 
     @property
     def period(self) -> tuple[float, float, float]:
