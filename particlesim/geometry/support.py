@@ -57,14 +57,20 @@ def _climb(hull, core, direction):
 
 
 @kernel
+def is_climbed(core):
+    """Whether a core (see ``farthest_vertex``) has so many vertices that it is climbed, not gone through."""
+    return core[1] - core[0] >= CLIMBED_VERTICES
+
+
+@kernel
 def farthest_vertex(hull, core, direction):
     """Number of the vertex of a core that is farthest along ``direction``, in body axes.
 
     ``hull`` are the arrays (vertex, link) of the shape table, ``core`` the (first vertex, last vertex, link) of a row.
     """
-    if core[1] - core[0] < CLIMBED_VERTICES:
-        return farthest_row(hull[0], core[0], core[1], direction)
-    return _climb(hull, core, direction)
+    if is_climbed(core):
+        return _climb(hull, core, direction)
+    return farthest_row(hull[0], core[0], core[1], direction)
 
 
 @kernel
@@ -135,7 +141,7 @@ def has_faces(table, shape):
 @kernel
 def has_many_vertices(table, shape):
     """Whether a core is better asked for its farthest vertices than gone through, vertex by vertex or face by face."""
-    return table.shape[shape].last_vertex - table.shape[shape].first_vertex >= CLIMBED_VERTICES
+    return is_climbed(core_of(table.shape[shape]))
 
 
 @kernel

@@ -16,8 +16,7 @@ from particlesim.core.jit import kernel
 from particlesim.core.math3d import add, axpy, cross, dot, inverse_rotate, load_vec3, norm, rotate, scale, sub
 from particlesim.dynamics.settings import STEP_REFINEMENTS
 from particlesim.geometry.shape_links import ring_of
-from particlesim.geometry.support import farthest_vertex
-from particlesim.geometry.tolerances import CLIMBED_VERTICES
+from particlesim.geometry.support import farthest_vertex, is_climbed
 
 # Motions of a normal: it stands, turns with the first body, with the second, or with an edge of each.
 STANDING = 0
@@ -107,7 +106,7 @@ def facing_edge(hull, core, direction):
     vertex, (first, last, _) = hull[0], core[0]
     if first == last:
         return _NOWHERE, 0.0, 0.0
-    if last - first >= CLIMBED_VERTICES:
+    if is_climbed(core[0]):
         return _facing_edge_of_rings(hull, core[0], direction)
     best = second = first
     reach = nearly = hardly = -math.inf
