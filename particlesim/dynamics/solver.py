@@ -85,6 +85,7 @@ class Solver:
         self._resting = RestingContacts(system)
         self._clock = new_clocks(len(system.body))
         self._accumulator = np.zeros((system.particles, columns_needed(system)))
+        self._friction = system.law if (system.law["friction"] > 0.0).any() else None
         self._bound = np.zeros(system.bounded, dtype=BOUND)  # scratch, by place
         self._segments = no_segments()  # scratch, with room for those of the substeps so far
         self._periodic_room = _periodic_room(system)
@@ -292,11 +293,10 @@ class Solver:
         """Carry islands through their impacts; the paths with theirs, and how many islands were left unfinished."""
         system, neighbours, count = self._system, self.state.neighbours, len(islands.start) - 1
         team = ThreadTeam(ISLAND_COST * count)
-        friction = system.law if (system.law["friction"] > 0.0).any() else None
-        room = self._accumulator
+        accumulator, friction = self._accumulator, self._friction
         parts = team.each(
             lambda _, first, last: run_islands(
-                system, paths.clock, neighbours, predicted, islands, duration, room, (first, last, friction)
+                system, paths.clock, neighbours, predicted, islands, duration, accumulator, (first, last, friction)
             ),
             count,
             4 * team.threads,

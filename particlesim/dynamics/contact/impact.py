@@ -115,20 +115,17 @@ def _rebound(system, a, b, speed):
 
 
 @kernel
-def _add_push(push, impulse, lever_arm, normal):
-    """Add an impulse along ``normal`` at ``lever_arm`` to what a body gets in the present round."""
-    angular = cross(lever_arm, normal)
-    for axis in range(3):
-        push[axis] += impulse * normal[axis]
-        push[3 + axis] += impulse * angular[axis]
-
-
-@kernel
-def _add(push, impulse, angular_impulse):
+def _add_push(push, impulse, angular_impulse):
     """Add an impulse and an angular impulse to what a body gets in the present round."""
     for axis in range(3):
         push[axis] += impulse[axis]
         push[3 + axis] += angular_impulse[axis]
+
+
+@kernel
+def _add_push_at(push, impulse, lever_arm, normal):
+    """Add an impulse along ``normal`` at ``lever_arm`` to what a body gets in the present round."""
+    _add_push(push, scale(normal, impulse), scale(cross(lever_arm, normal), impulse))
 
 
 @kernel
@@ -167,15 +164,15 @@ def _propose(system, moment, c, leave_slow, friction):
         impulse, turned_a, turned_b, energy = rough_impulse(
             system, a, b, contact, moment.points[c], point, factor - 1.0
         )
-        _add(moment.push[contact.a], scale(impulse, -1.0), turned_a)
-        _add(moment.push[contact.b], impulse, turned_b)
+        _add_push(moment.push[contact.a], scale(impulse, -1.0), turned_a)
+        _add_push(moment.push[contact.b], impulse, turned_b)
         return what, energy
     stop = -speed / (inverse_mass_at(a, point, normal) + inverse_mass_at(b, sub(point, offset), normal))
     contact.impulse = factor * stop
     energy = factor * factor * stop * -speed
     contact.lost[0] = 0.5 * (2.0 / factor - 1.0) * energy
-    _add_push(moment.push[contact.a], -contact.impulse, point, normal)
-    _add_push(moment.push[contact.b], contact.impulse, sub(point, offset), normal)
+    _add_push_at(moment.push[contact.a], -contact.impulse, point, normal)
+    _add_push_at(moment.push[contact.b], contact.impulse, sub(point, offset), normal)
     return what, energy
 
 

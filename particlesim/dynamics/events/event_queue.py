@@ -308,8 +308,9 @@ def _run_island(system, clock, neighbours, members, duration, queue, moment, seg
 def run_islands(system, clock, neighbours, predicted, islands, duration, accumulator, block):
     """Carry out the impacts of the islands of a block (first, last, contact laws if there is friction) in ``duration``.
 
-    ``predicted`` are the impacts on the paths of the start. Adds to the row of ``accumulator`` (n, ACCUMULATED) of each
-    island's first member. Returns the path segments, and how many islands were left with impacts to resolve.
+    ``predicted`` are the impacts on the paths of the start. Adds to the row of ``accumulator`` (n, columns as in
+    booking.py) of each island's first member. Returns the path segments, and how many islands were left with impacts to
+    resolve.
     """
     system, clock, neighbours, predicted, islands, accumulator = without_refcounts(
         (system, clock, neighbours, predicted, islands, accumulator)
