@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from particlesim.core.constants import DISSIPATION
 from particlesim.rendering.camera import Box, subject_box
 from particlesim.rendering.shading.colour import ParticleColours
 from particlesim.scene import Scene
+from particlesim.setup.build import contact_laws_of
 from particlesim.trajectory.frames import Frame, Header, Ledger
 
 
@@ -26,6 +28,8 @@ class Look:
         Colours of particles, with the scales of fields.
     start
         Ledger of the first frame, which changes refer to; None where it is not known.
+    causes
+        Of DISSIPATION, those that there can be in the scene.
     """
 
     scene: Scene
@@ -33,6 +37,7 @@ class Look:
     subject: Box
     colours: ParticleColours
     start: Ledger | None
+    causes: tuple[str, ...]
 
 
 def look_of(scene: Scene, header: Header, first: Frame) -> Look:
@@ -43,4 +48,14 @@ def look_of(scene: Scene, header: Header, first: Frame) -> Look:
         subject=subject_box(scene, header, first),
         colours=ParticleColours(scene, header, first),
         start=first.ledger,
+        causes=_causes(scene),
     )
+
+
+def _causes(scene: Scene) -> tuple[str, ...]:
+    """What can take energy in a scene, of DISSIPATION."""
+    laws = contact_laws_of(scene)
+    soft, weight = (laws["restitution"] < 1.0).any(), any(scene.world.gravity)
+    rough, rolling = ((laws[name] > 0.0).any() for name in ("friction", "rolling_friction"))
+    there = soft, rough, rough and rolling, soft and weight
+    return tuple(cause for cause, possible in zip(DISSIPATION, there, strict=True) if possible)

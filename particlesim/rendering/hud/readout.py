@@ -14,7 +14,6 @@ from particlesim.rendering.hud.history import History
 from particlesim.rendering.hud.panel import Panel, Style
 from particlesim.rendering.look import Look
 from particlesim.scene import Scene
-from particlesim.setup.build import contact_laws_of
 from particlesim.trajectory.frame_aabb import frame_boxes
 from particlesim.trajectory.frames import Frame, Ledger
 
@@ -90,13 +89,9 @@ def _dissipation(look: Look, frame: Frame, history: History) -> Iterator[Row]:
     """What each cause that there can be in the scene took of the energy."""
     if frame.ledger is None or frame.ledger.dissipated is None or look.start is None:
         return
-    laws = contact_laws_of(look.scene)
-    soft, weight = (laws["restitution"] < 1.0).any(), any(look.scene.world.gravity)
-    rough, rolling = ((laws[name] > 0.0).any() for name in ("friction", "rolling_friction"))
     scale = _all_energy(look.start)
-    there = soft, rough, rough and rolling, soft and weight
-    for cause, possible, energy in zip(DISSIPATION, there, frame.ledger.dissipated.tolist(), strict=True):
-        if possible:
+    for cause, energy in zip(DISSIPATION, frame.ledger.dissipated.tolist(), strict=True):
+        if cause in look.causes:
             yield Row(f"lost by {cause}", f"{100.0 * energy / scale if scale else 0.0:.1f} %", "100.0 %")
 
 
