@@ -8,20 +8,25 @@ cannot be run, what a change does not concern is not compiled again, and a packa
 from __future__ import annotations
 
 import functools
+import gc
 import hashlib
 import os
 import re
 import stat
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numba
 from numba.core import cgutils, types
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.imputils import impl_ret_untracked
 from numba.extending import intrinsic, models, register_model
 from numba.np.arrayobj import make_array
+
+from particlesim.core.inner_kernels import take_short_cuts
 
 _PACKAGE = Path(__file__).parent.parent
 _IMPORT = re.compile(rb"^\s*from particlesim\.([\w.]+) import", re.MULTILINE)
@@ -44,7 +49,7 @@ def _digest(module: str) -> str:
         if name not in found:
             found.add(name)
             waiting += [match.decode() for match in _IMPORT.findall(_source(name))]
-    sources = hashlib.sha256(_source("core.jit"))
+    sources = hashlib.sha256(_source("core.jit") + _source("core.inner_kernels"))
     for name in sorted(found):
         sources.update(_source(name))
     return sources.hexdigest()[:16]
@@ -86,6 +91,7 @@ def is_compiled(module: str) -> bool:
 
 
 _njit: Any = numba.njit
+take_short_cuts()
 
 
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:
@@ -107,6 +113,8 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
 def _role(kind: Any) -> Any:
     """The one type of all arguments that differ in nothing that matters: constants and short integers among them."""
     plain: Any = types.unliteral(kind)
+    if isinstance(kind, types.BaseAnonymousTuple):
+        return types.BaseTuple.from_types([_role(element) for element in plain])
     widest: Any = types.intp
     short = isinstance(kind, types.Integer) and plain.signed and plain.bitwidth < widest.bitwidth
     return widest if short else plain
@@ -115,7 +123,26 @@ def _role(kind: Any) -> Any:
 def _compile_once_a_role(dispatcher: Any) -> None:
     """Keep numba from compiling a function anew for each constant that it is called with."""
     compile_as_typed = dispatcher.compile
-    dispatcher.compile = lambda signature: compile_as_typed(tuple(_role(kind) for kind in signature))
+
+    def compile_once(signature: Any) -> Any:
+        roles = tuple(_role(kind) for kind in signature)
+        if roles in dispatcher.overloads:
+            return compile_as_typed(roles)
+        with global_compiler_lock, _rare_collections():
+            return compile_as_typed(roles)
+
+    dispatcher.compile = compile_once
+
+
+@contextmanager
+def _rare_collections() -> Iterator[None]:
+    """Let Python look for garbage less often: a compiler makes millions of objects, and most of them stay."""
+    usual = gc.get_threshold()
+    gc.set_threshold(50_000, *usual[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*usual)
 
 
 def kernel(function: Callable[..., Any]) -> Any:

@@ -69,7 +69,8 @@ def grow(array):
 def grow_records(array):
     """An array (n,) of records with those of this one and room for as many again."""
     longer = np.empty(2 * len(array), dtype=array.dtype)
-    longer[: len(array)] = array
+    for k in range(len(array)):
+        longer[k] = array[k]
     return longer
 
 
