@@ -11,6 +11,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.text import Text
 
+from particlesim.core.constants import COMPILING
+
 # Seconds between lines where there is no terminal.
 _INTERVAL = 5.0
 
@@ -41,6 +43,11 @@ def _words(seconds: float) -> str:
     return f"{minutes} min left" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min left"
 
 
+def _unit_of(phase: str, usual: str) -> str:
+    """What is counted in a phase."""
+    return "kernel" if phase == COMPILING else usual
+
+
 class _Lines:
     """Plain lines to standard error: what is going on, ``unit`` k of n, time left."""
 
@@ -56,7 +63,8 @@ class _Lines:
         if phase == self._phase and now - self._last < _INTERVAL and done < total:
             return
         self._phase, self._last = phase, now
-        counted = f": {self._unit} {done} of {total}" if done else f" {total} {self._unit}s"
+        unit = _unit_of(phase, self._unit)
+        counted = f": {unit} {done} of {total}" if done else f" {total} {unit}s"
         ending = f", {_words(left)}" if left is not None and done < total else ""
         print(f"{phase}{counted}{ending}", file=sys.stderr, flush=True)
 
@@ -80,7 +88,8 @@ class _Bar:
         self._rate = _Rate()
 
     def __call__(self, phase: str, done: int, total: int) -> None:
-        counted = f"{self._unit} {done} of {total}" if done else f"{total} {self._unit}s"
+        unit = _unit_of(phase, self._unit)
+        counted = f"{unit} {done} of {total}" if done else f"{total} {unit}s"
         self._bar.update(
             self._task,
             completed=done,

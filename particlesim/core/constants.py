@@ -24,3 +24,6 @@ DISSIPATION = ("restitution", "friction", "rolling", "rest")
 
 # The most points a contact manifold keeps, as two squares across each other have.
 MAX_MANIFOLD = 8
+
+# What is told, with how many kernels of how many, while they are compiled.
+COMPILING = "compiling, this once"

@@ -26,6 +26,7 @@ from numba.core.imputils import impl_ret_untracked
 from numba.extending import intrinsic, models, register_model
 from numba.np.arrayobj import make_array
 
+from particlesim.core.compile_lock import compiled_here
 from particlesim.core.inner_kernels import take_short_cuts
 
 _PACKAGE = Path(__file__).parent.parent
@@ -123,12 +124,13 @@ def _role(kind: Any) -> Any:
 def _compile_once_a_role(dispatcher: Any) -> None:
     """Keep numba from compiling a function anew for each constant that it is called with."""
     compile_as_typed = dispatcher.compile
+    lock_file = Path(CACHE_FOLDER, "compiling")
 
     def compile_once(signature: Any) -> Any:
         roles = tuple(_role(kind) for kind in signature)
         if roles in dispatcher.overloads:
             return compile_as_typed(roles)
-        with global_compiler_lock, _rare_collections():
+        with global_compiler_lock, _rare_collections(), compiled_here(lock_file, dispatcher.py_func):
             return compile_as_typed(roles)
 
     dispatcher.compile = compile_once

@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from particlesim.core.jit import is_compiled
 from particlesim.scene import Scene
 from particlesim.simulation.simulation import Simulation
 from particlesim.trajectory.frames import Frame, Header
@@ -78,10 +77,7 @@ def frame_source_until(
 
 
 def start(scene: Scene, threads: int | None, progress: Progress | None) -> Simulation:
-    """The simulation of a scene, its kernels compiled. SceneError if it cannot be built."""
-    if not is_compiled("dynamics.events.event_queue"):
-        tell(progress, "compiling, this once", 0, scene.frames)
-        _compile(scene)
+    """The simulation of a scene. SceneError if it cannot be built."""
     tell(progress, "preparing", 0, scene.frames)
     return Simulation(scene, threads=threads)
 
@@ -98,21 +94,6 @@ def tell(progress: Progress | None, phase: str, done: int, total: int) -> None:
     """Say how far the work is, if it is to be said."""
     if progress is not None:
         progress(phase, done, total)
-
-
-def _compile(scene: Scene) -> None:
-    """Run two cubes into each other, so that the kernels a scene needs are compiled before its clock runs."""
-    at, towards = [0.3, 0.3, 0.3], [-1.0, -1.0, -1.0]
-    poses = [{"position": [-1.0, -1.0, -1.0]}, {"position": at, "velocity": towards}]
-    table = {
-        "world": {"size": [4.0, 4.0, 4.0]},
-        "solver": scene.solver,
-        "particles": [
-            {"shape": "cube", "placement": {"kind": "list", "poses": poses}},
-            {"shape": "sphere", "count": 1},
-        ],
-    }
-    Simulation(Scene(**table)).run(duration=0.5)
 
 
 def _among(wanted: range | None, total: int) -> range:

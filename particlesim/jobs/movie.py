@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from particlesim.core.output_path import check_output
+from particlesim.jobs.compiling import compile_kernels
 from particlesim.jobs.drawers import Drawers
 from particlesim.jobs.frame_source import (
     FrameSource,
@@ -68,6 +69,7 @@ def simulate(
         If the file cannot be written.
     """
     check_output(path, ".gsd")
+    compile_kernels(scene, None, progress)
     simulation = start(scene, threads, progress)
     summary = _summary(scene, simulation.header)
     with TrajectoryWriter(path, simulation.header) as writer:
@@ -120,6 +122,7 @@ def render(
     check_output(path, ".mp4", ".png")
     with opened(source) as movable:
         platform.choose()
+        _compile(movable, look, progress)
         chosen = frame_source(movable, frames, threads, progress)
         scene = look or chosen.scene
         with MovieJob(chosen, scene, progress) as job:
@@ -163,12 +166,19 @@ def still(
     check_output(path, ".png")
     with opened(source) as movable:
         platform.choose()
+        _compile(movable, look, progress)
         chosen = frame_source_until(time, movable, threads, progress)
         with MovieJob(chosen, look or chosen.scene, progress) as job:
             for _ in job.images():
                 pass
             write_image(path, job.poster)
     return job.summary
+
+
+def _compile(source: Scene | Trajectory, look: Scene | None, progress: Progress | None) -> None:
+    """Compile what pictures of a source need, its own or with the ``look`` of another scene."""
+    own, simulated = (source.scene, None) if isinstance(source, Trajectory) else (source, source)
+    compile_kernels(simulated, (look or own).movie, progress)
 
 
 class MovieJob:

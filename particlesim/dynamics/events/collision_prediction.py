@@ -227,6 +227,8 @@ def _colliding(
 ) -> np.ndarray:
     """Those of the candidates that collide, with the times of LOOK_CLOSER filled in."""
     candidates = np.concatenate(parts)
+    if not (candidates["time"] == LOOK_CLOSER).any():  # as among spheres, which need not have it compiled
+        return candidates
     team = ThreadTeam(PAIR_COST * len(candidates))
     # Some pairs take far longer than others: threads that are done take on more.
     team.each(
