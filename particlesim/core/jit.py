@@ -21,6 +21,7 @@ from typing import Any
 
 import numba
 from numba.core import cgutils, types
+from numba.core.caching import _CacheLocator
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.imputils import impl_ret_untracked
 from numba.extending import intrinsic, models, register_model
@@ -28,6 +29,7 @@ from numba.np.arrayobj import make_array
 
 from particlesim.core.compile_lock import compiled_here
 from particlesim.core.inner_kernels import take_short_cuts
+from particlesim.core.ready_made import copy_ready_made, use_ready_made
 
 _PACKAGE = Path(__file__).parent.parent
 _IMPORT = re.compile(rb"^\s*from particlesim\.([\w.]+) import", re.MULTILINE)
@@ -92,6 +94,7 @@ def is_compiled(module: str) -> bool:
 
 
 _njit: Any = numba.njit
+_READY_MADE = use_ready_made()
 take_short_cuts()
 
 
@@ -101,7 +104,11 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     config: Any = numba.config
     elsewhere = config.CACHE_DIR
     ours = function.__module__.startswith("particlesim.")
-    config.CACHE_DIR = os.path.join(CACHE_FOLDER, _digest(function.__module__.removeprefix("particlesim.")))
+    digest = _digest(function.__module__.removeprefix("particlesim."))
+    config.CACHE_DIR = os.path.join(CACHE_FOLDER, digest)
+    if _READY_MADE:
+        source = function.__code__.co_filename
+        copy_ready_made(digest, Path(config.CACHE_DIR, _CacheLocator.get_suitable_cache_subpath(source)))
     try:
         compiled = _njit(cache=ours, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
     finally:
