@@ -111,11 +111,12 @@ def test_one_alone_gets_all_the_light():
 def test_the_middle_of_a_crowd_gets_less_than_its_top():
     position, outer = heap(1000)
     light = AmbientOcclusion(WORLD, outer).light(position, np.arange(1000))
-    assert ((light >= 0.35) & (light <= 1.0)).all()
+    assert ((light >= 0.5) & (light <= 1.0)).all()
     top, middle = position[:, 2] > 0.85, (np.abs(position) < 0.4).all(axis=1)
     bottom = (position[:, 2] < -0.8) & (np.abs(position[:, :2]) < 0.4).all(axis=1)
     assert light[top].mean() > 0.65
-    assert light[middle].mean() < light[top].mean() - 0.25
+    # Half of the light comes whatever there is about; of what does not, the middle lacks much.
+    assert light[middle].mean() < light[top].mean() - 0.5 * 0.385
     assert light[bottom].mean() < light[middle].mean()
     # Of some only that light is asked for.
     some = np.array([7, 2, 900])

@@ -18,7 +18,7 @@ from particlesim.rendering.visibility.instances import ALL_BODIES
 _CELLS = 32
 
 # Share of the ambient light under any number of bodies: what they reflect on each other.
-_LEAST = 0.35
+_LEAST = 0.5
 
 # Share of its own optical depth that a body adds at its centroid, from half of the eight cells that share it: the mean
 # over places in a cell and over directions, by experiment.

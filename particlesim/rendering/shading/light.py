@@ -8,10 +8,11 @@ import numpy as np
 
 from particlesim.core.jit import kernel
 
-# The colours of the light, linear. Sky and ground make the light that comes from everywhere.
+# The colours of the light, linear. Sky and ground make the light that comes from everywhere; what the ground sends back
+# fills what would be black below.
 KEY = np.float32(0.86), np.float32(0.83), np.float32(0.78)
 SKY = np.float32(0.44), np.float32(0.47), np.float32(0.52)
-GROUND = np.float32(0.21), np.float32(0.20), np.float32(0.19)
+GROUND = np.float32(0.31), np.float32(0.295), np.float32(0.28)
 
 NONE, HALF, ONE, TWO = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(2.0)
 _FULL = np.float32(255.0)
