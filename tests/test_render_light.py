@@ -19,7 +19,7 @@ def below(position, inner, outer=None):
     """Light on a floor whose squares are a tenth of a metre, (40, 60); rows along y."""
     inner = np.atleast_1d(inner)
     outer = inner if outer is None else np.atleast_1d(outer)
-    light = FloorOcclusion(HALF, FLOOR, inner, outer).light(np.atleast_2d(position))
+    light = FloorOcclusion(-HALF, HALF, FLOOR, inner, outer).light(np.atleast_2d(position))
     assert light.dtype == np.float32
     return light
 
@@ -87,7 +87,7 @@ def test_shades_of_many_multiply_and_a_floor_below_nothing_is_light():
     both = below(places, [0.1, 0.1])
     hidden = [(1.0 - below(place, 0.1)) / SHARE for place in places]
     assert both == pytest.approx(1.0 - SHARE * (1.0 - (1.0 - hidden[0]) * (1.0 - hidden[1])), abs=1e-5)
-    empty_floor = FloorOcclusion(HALF, FLOOR, np.zeros(0), np.zeros(0)).light(np.zeros((0, 3)))
+    empty_floor = FloorOcclusion(-HALF, HALF, FLOOR, np.zeros(0), np.zeros(0)).light(np.zeros((0, 3)))
     assert empty_floor.shape == (128, 192) and (empty_floor == 1.0).all()
 
 

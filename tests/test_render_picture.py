@@ -7,6 +7,7 @@ from particlesim.core.constants import SPHERE
 from particlesim.geometry import shapes
 from particlesim.rendering import Renderer
 from particlesim.rendering.look import look_of
+from particlesim.rendering.shading.lighting import towards_light
 from particlesim.scene import Scene
 from particlesim.trajectory.frames import Frame, Header
 
@@ -217,6 +218,41 @@ def test_particles_cast_shadows_on_the_floor_which_only_a_wall_has():
     grey = (np.ptp(with_ball, axis=2) < 12) & (with_ball.max(axis=2) < 220)
     assert grey.sum() > 300
     assert not np.any(with_ball[:3] < 255)
+
+
+def pixel_of(point, position, target=(0.0, 0.0, 0.0)):
+    """Row and column, not whole, where a camera at a position sees a point."""
+    back = np.subtract(position, target) / np.linalg.norm(np.subtract(position, target))
+    right = np.cross((0.0, 0.0, 1.0), back)
+    right /= np.linalg.norm(right)
+    x, y, z = np.subtract(point, position) @ np.column_stack([right, np.cross(back, right), -back])
+    per = 0.5 * HEIGHT / SLOPE
+    return 0.5 * HEIGHT - per * y / z - 0.5, 0.5 * WIDTH + per * x / z - 0.5
+
+
+@pytest.mark.parametrize("height", [1.0, 4.0])
+def test_edges_that_lie_on_the_floor_are_whole_lines(height):
+    eye = (10.0, 4.0, height - 3.0)
+    scene = make_scene("red", world={"boundary": "wall"}, box=True, camera={"kind": "look-at", "position": eye})
+    image = draw(scene, [shapes.sphere()], [0.1], make_frame([(0.0, 0.0, 2.0)]))[..., 1].astype(int)
+    for start, end in (((3, -3), (3, 3)), ((-3, 3), (3, 3)), ((-3, -3), (-3, 3)), ((-3, -3), (3, -3))):
+        shares = np.linspace(0.05, 0.95, 61)
+        places = [pixel_of((*(np.multiply(1 - s, start) + np.multiply(s, end)), -3.0), eye) for s in shares]
+        inside = [(round(r), round(c)) for r, c in places if 2 <= r < HEIGHT - 3 and 2 <= c < WIDTH - 3]
+        dark = np.array([image[r - 1 : r + 2, c - 1 : c + 2].min() for r, c in inside])
+        assert len(dark) > 10 and dark.max() < image[2, 2] - 30 and np.ptp(dark) < 70
+
+
+def test_the_floor_bears_whole_shadows_beside_a_tall_world():
+    eye, ball = (12.0, 6.0, 6.0), (0.0, 0.0, 2.4)
+    camera = {"kind": "look-at", "position": eye, "target": (0.0, 0.0, -3.0)}
+    scene = make_scene("red", world={"size": (2.0, 2.0, 6.0), "boundary": "wall"}, camera=camera)
+    image = draw(scene, [shapes.sphere()], [1.0], make_frame([ball]))[..., 1].astype(int)
+    towards = towards_light(scene)
+    foot = np.subtract(ball, 5.4 / towards[2] * towards)
+    assert np.abs(foot[:2]).max() > 2.0  # well beside the world
+    row, column = (round(float(k)) for k in pixel_of(foot, eye, (0.0, 0.0, -3.0)))
+    assert image[row, column] == pytest.approx(0.97 * 0.78 * 255, abs=3)
 
 
 def test_box_edges_and_cells_are_drawn_over_nothing_but_background():

@@ -20,7 +20,8 @@ VIEW = projection((9.0, 3.0, 4.0))
 TOWARDS = np.array([0.5, -0.3, 0.8]) / np.linalg.norm([0.5, -0.3, 0.8])
 BACKGROUND = np.array([0.2, 0.5, 0.8])
 HAZE = np.array([7.0, 0.2, 0.3])
-NO_FLOOR = Ground(np.array([BACKGROUND] * 3), np.array([3.0, 3.0, -3.0, 1.0]), np.zeros((0, 0), np.float32))
+CORNER = np.array([3.0, 3.0])
+NO_FLOOR = Ground(np.array([BACKGROUND] * 3), -CORNER, CORNER, -3.0, 1.0, np.zeros((0, 0), np.float32))
 
 
 def lighting(closeness):
@@ -164,7 +165,6 @@ def test_nothing_seen_is_all_background():
         view = projection((9.0, 3.0, 4.0), size=(7, 5))
         image = shade(view, blind, particles.instances, paint, lighting(-np.inf), NO_FLOOR)
         assert seen.indices.shape == (0,) and (image[..., :3] == np.rint(255.0 * BACKGROUND)).all()
-        assert (blind.inverse_depth == 0.0).all()
 
 
 # ---- the floor ----------------------------------------------------------------------------------------------------
@@ -173,21 +173,22 @@ def test_nothing_seen_is_all_background():
 def on_floor(view, ground):
     """Where rays meet the plane of the floor, (height, width, 3) in the world, and which do."""
     way = rays(view)[1] @ view.axes
-    distance = (ground.area[2] - view.eye[2]) / way[..., 2]
+    distance = (ground.height - view.eye[2]) / way[..., 2]
     return view.eye + distance[..., None] * way, distance > 0.0
 
 
 def test_the_floor_has_its_colours_and_fades_into_the_background():
     random = np.random.default_rng(5)
     sky = random.uniform(0.6, 1.0, (7, 11)).astype(np.float32)
-    ground = Ground(np.array([BACKGROUND, [0.9, 0.8, 0.7], [0.5, 0.6, 0.4]]), np.array([4.5, 2.5, -1.0, 1.5]), sky)
+    lower, upper, rim = np.array([-4.5, -1.5]), np.array([3.5, 2.5]), 1.5
+    ground = Ground(np.array([BACKGROUND, [0.9, 0.8, 0.7], [0.5, 0.6, 0.4]]), lower, upper, -1.0, rim, sky)
     nobody = crowd(0, 0, 1.0, 0.1, 0.2)
     place, met_it = on_floor(VIEW, ground)
-    past = np.maximum(np.abs(place[..., :2]) - ground.area[:2], 0.0) / ground.area[3]
+    past = np.maximum(np.maximum(place[..., :2] - upper, lower - place[..., :2]), 0.0) / rim
     past = np.minimum(np.hypot(past[..., 0], past[..., 1]), 1.0)
     strength = np.where(met_it, 1.0 - past**2 * (3.0 - 2.0 * past), 0.0)[..., None]
     column, row = (
-        np.clip((place[..., k] / (ground.area[k] + ground.area[3]) + 1.0) * 0.5 * n - 0.5, 0.0, n - 1.001)
+        np.clip((place[..., k] - lower[k] + rim) / (upper[k] - lower[k] + 2.0 * rim) * n - 0.5, 0.0, n - 1.001)
         for k, n in ((0, 11), (1, 7))
     )
     i, j = column.astype(int), row.astype(int)
@@ -195,14 +196,21 @@ def test_the_floor_has_its_colours_and_fades_into_the_background():
     light = (1 - a) * (1 - b) * sky[j, i] + a * (1 - b) * sky[j, i + 1]
     light += (1 - a) * b * sky[j + 1, i] + a * b * sky[j + 1, i + 1]
     for closeness, colour in ((-np.inf, ground.colours[1]), (np.inf, ground.colours[2])):
-        image, buffer, _ = shaded(nobody, lighting(closeness), ground)
+        image = shaded(nobody, lighting(closeness), ground)[0]
         want = strength * colour * light[..., None] + (1.0 - strength) * BACKGROUND
         assert np.abs(image - want).max() < 1.2 / 255.0
         assert 0.1 < (strength == 1.0).mean() < 0.9 and (strength == 0.0).mean() > 0.05
-        depth = (place - VIEW.eye) @ VIEW.axes[2]
-        seen = strength[..., 0] > 1e-4
-        assert buffer.inverse_depth[seen] == pytest.approx(1.0 / depth[seen], rel=1e-5)
-        assert (buffer.inverse_depth[strength[..., 0] == 0.0] == 0.0).all()
+
+
+def test_the_floor_is_seen_from_above_only():
+    ground = Ground(np.array([BACKGROUND, [0.9] * 3, [0.4] * 3]), -CORNER, CORNER, -1.0, 1.0, np.ones((2, 2), np.float32))
+    balls = crowd(3, 20, 2.0, 0.4, 0.9, kinds=1)
+    for height, seen in ((1.0, True), (-1.0, False), (-4.0, False)):
+        view = projection((9.0, 3.0, height))
+        image, buffer, _ = shaded(balls, lighting(-np.inf), ground, view)
+        bare = shaded(balls, lighting(-np.inf), NO_FLOOR, view)[0]
+        assert (buffer.id >= 0).any() and (np.abs(image - bare).max() > 0.1) == seen
+        assert seen or np.array_equal(image, bare)
 
 
 # ---- shadows ------------------------------------------------------------------------------------------------------
@@ -223,7 +231,8 @@ def test_shadows_lie_where_rays_to_the_light_are_stopped_with_edges_as_soft_as_t
     light, texel = sun(pixels), 10.0 / pixels
     shadow = shadow_map(rasterise(light.projection, *balls.scene).inverse_depth)
     white, black = np.ones(3), np.zeros(3)
-    ground = Ground(np.array([[0.5] * 3, white, black]), np.array([4.0, 4.0, -2.5, 0.5]), np.ones((2, 2), np.float32))
+    half = np.array([4.0, 4.0])
+    ground = Ground(np.array([[0.5] * 3, white, black]), -half, half, -2.5, 0.5, np.ones((2, 2), np.float32))
     image, buffer, _ = shaded(balls, light.in_view(view, shadow), ground, view)
     place, _ = on_floor(view, ground)
     # From each place on the floor, how far the ray to the light passes inside the nearest ball.
@@ -231,7 +240,7 @@ def test_shadows_lie_where_rays_to_the_light_are_stopped_with_edges_as_soft_as_t
     for centre, size in zip(balls.position, balls.size, strict=True):
         arm = centre - place
         off = np.minimum(off, np.linalg.norm(arm - (arm @ TOWARDS)[..., None] * TOWARDS, axis=-1) - 0.5 * size)
-    floor = (buffer.id < 0) & (np.abs(place[..., :2]) < ground.area[:2]).all(axis=-1)
+    floor = (buffer.id < 0) & (np.abs(place[..., :2]) < half).all(axis=-1)
     lit, reach = image[..., 0], 1.5 * np.sqrt(2.0) * texel + 0.7 * texel
     assert (lit[floor & (off > reach)] > 0.99).all() and (lit[floor & (off < -reach)] < 0.01).all()
     assert (floor & (off < -reach)).sum() > 500 and (floor & (off > reach)).sum() > 500

@@ -7,10 +7,11 @@ import numpy as np
 from particlesim.rendering.camera import View
 from particlesim.rendering.gl import geometry
 from particlesim.rendering.shading.colour import encoded
+from particlesim.rendering.shading.lighting import towards_light
 from particlesim.rendering.shading.shade_floor import Ground
 from particlesim.scene import Scene
 
-# The floor fades out over this fraction of the world's longer horizontal side.
+# The floor fades out over this fraction of the world's longer horizontal side, beyond all shadows that it may bear.
 _FLOOR_RIM = 0.45
 
 # How bright the floor is in the shadow, in sRGB.
@@ -29,19 +30,24 @@ class Environment:
         self._rim = _FLOOR_RIM * float(max(self._size[:2]))
         self.background = encoded(scene.movie.background)
         self.dark = bool(self.background.mean() < 0.5)
+        lower, towards = -0.5 * self._size, towards_light(scene)
+        # How far from below it the shadow of what is at the top of the world falls.
+        cast = -self._size[2] / towards[2] * towards[:2]
+        self._floor = lower[:2] + np.minimum(cast, 0.0), -lower[:2] + np.maximum(cast, 0.0), float(lower[2])
         # A shade off the background, so that the floor is seen, and a shadow on it even when that is black.
         self._bright = self.background * 0.97 + (0.06 if self.dark else 0.0)
         self.has_floor = scene.world.boundary[2] == "wall"
 
     @property
-    def floor(self) -> tuple[np.ndarray, float]:
-        """Half the width of the floor with its fading rim, (2,) [m], and its height [m]."""
-        return 0.5 * self._size[:2] + self._rim, -0.5 * float(self._size[2])
+    def floor(self) -> tuple[np.ndarray, np.ndarray, float]:
+        """Corners of the floor with its fading rim, (2,) each, and its height [m]."""
+        lower, upper, height = self._floor
+        return lower - self._rim, upper + self._rim, height
 
     def ground(self, light: np.ndarray) -> Ground:
         """The background and the floor; ``light`` (b, a) float32: share of the light that reaches the floor."""
         colours = np.array([self.background, self._bright, _FLOOR_SHADOW * self._bright])
-        return Ground(colours, np.array([*(0.5 * self._size[:2]), -0.5 * self._size[2], self._rim]), light)
+        return Ground(colours, *self._floor, self._rim, light)
 
     def haze(self, view: View) -> np.ndarray:
         """Where far things become pale, as ``Paint`` has it: from the nearest corner of the world to the farthest."""

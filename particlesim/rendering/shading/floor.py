@@ -24,28 +24,29 @@ _AMBIENT = 0.4
 
 
 class FloorOcclusion:
-    """A floor about the origin.
+    """A floor.
 
     Parameters
     ----------
-    half : (2,) float64
-        Half its width along x and y [m].
+    lower, upper : (2,) float64
+        Its corners [m].
     height : float
         Its z [m].
     inradius, radius : (n,) float64
         Radii of the spheres within and about the bodies above it [m].
     """
 
-    def __init__(self, half: np.ndarray, height: float, inradius: np.ndarray, radius: np.ndarray) -> None:
-        self._half = np.asarray(half, dtype=np.float64)
-        self._height = height
+    def __init__(
+        self, lower: np.ndarray, upper: np.ndarray, height: float, inradius: np.ndarray, radius: np.ndarray
+    ) -> None:
+        self._corner, self._size = np.array([*lower, height]), np.subtract(upper, lower)
         # A body hides about as much as a sphere between those within and about it.
         self._radius = 0.5 * (inradius + radius)
         typical = float(np.median(self._radius)) if len(radius) else 0.0
-        self._step = max(2.0 * float(max(self._half)) / _POINTS, typical)
+        self._step = max(float(max(self._size)) / _POINTS, typical)
 
     def light(self, position: np.ndarray, source: slice | np.ndarray = ALL_BODIES) -> np.ndarray:
-        """Share of the light that reaches the floor, (b, a) float32, from its corner (-x, -y) to (x, y).
+        """Share of the light that reaches the floor, (b, a) float32, from its lower corner to its upper one.
 
         Parameters
         ----------
@@ -54,10 +55,9 @@ class FloorOcclusion:
         source : slice or (m,) int64
             The body that each is an image of (see instances.py).
         """
-        width, depth = (max(2, round(2.0 * half / self._step)) for half in self._half)
+        width, depth = (max(2, round(edge / self._step)) for edge in self._size)
         light = np.ones((depth, width))
-        corner = np.array([*-self._half, self._height])
-        _shade(np.ascontiguousarray(position), self._radius[source], corner, 2.0 * self._half, light)
+        _shade(np.ascontiguousarray(position), self._radius[source], self._corner, self._size, light)
         return (1.0 - _AMBIENT * (1.0 - light)).astype(np.float32)
 
 

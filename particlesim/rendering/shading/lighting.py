@@ -73,14 +73,19 @@ class Lighting(NamedTuple):
     shadow: ShadowMap
 
 
+def towards_light(scene: Scene) -> np.ndarray:
+    """Unit vector (3,) towards the key light of a scene."""
+    a, e = np.radians([light_azimuth(scene), _ELEVATION])
+    return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+
+
 def key_light(scene: Scene, pixels: int, radius: float = 0.0) -> Light:
     """The light of a scene, with a shadow map of up to ``pixels`` along its longer side.
 
     ``radius`` of a usual particle [m]: where it is large, so are the texels.
     """
-    a, e = np.radians([light_azimuth(scene), _ELEVATION])
-    towards = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-    right = np.array([-np.sin(a), np.cos(a), 0.0])
+    towards = towards_light(scene)
+    right = np.array([-towards[1], towards[0], 0.0]) / np.hypot(*towards[:2])
     axes = np.array([right, np.cross(towards, right), -towards])
     reach = _ROOM * np.abs(axes) @ (0.5 * np.asarray(scene.world.size))
     # Texels are squares in the world: the shorter side has fewer of them, and reaches as far as whole ones do.

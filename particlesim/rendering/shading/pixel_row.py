@@ -50,13 +50,14 @@ class PixelRow(NamedTuple):
 
 @kernel
 def row_buffers(width):
-    """Room for rows: ``lit``, ``share``, ``across``, ``along``, ``value`` and ``texel``.
+    """Room for rows: ``close``, ``lit``, ``share``, ``across``, ``along``, ``value`` and ``texel``.
 
     Each is an array of its own: of rows of one array the compiler cannot tell that they do not overlap.
     """
-    lit, share = np.empty(width, dtype=np.float32), np.empty(width, dtype=np.float32)
-    across, along = np.empty(width, dtype=np.float32), np.empty(width, dtype=np.float32)
-    return lit, share, across, along, np.empty(width, dtype=np.float32), np.empty(width, dtype=np.int32)
+    close, lit = np.empty(width, dtype=np.float32), np.empty(width, dtype=np.float32)
+    share, across = np.empty(width, dtype=np.float32), np.empty(width, dtype=np.float32)
+    along, value = np.empty(width, dtype=np.float32), np.empty(width, dtype=np.float32)
+    return close, lit, share, across, along, value, np.empty(width, dtype=np.int32)
 
 
 @kernel

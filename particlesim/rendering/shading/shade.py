@@ -78,10 +78,7 @@ def shade(
     lighting: Lighting,
     ground: Ground,
 ) -> np.ndarray:
-    """The picture, (height, width, 4) uint8 sRGB, its first row the lowest and its fourth channel full.
-
-    The inverse depth of ``buffer`` becomes that of the floor where no instance is seen, 0 where nothing is.
-    """
+    """The picture, (height, width, 4) uint8 sRGB, its first row the lowest and its fourth channel full."""
     height, width = buffer.id.shape
     pixels = np.empty((height, width), dtype=np.int32)
     faces = faces_in_view(instances, paint.seen.indices, projection)
@@ -118,24 +115,24 @@ def _list_instances(ids, number, indices):
 def _shade_rows(rows, strip, buffer, world, lighting, ground, pixels):
     strip, buffer, world = without_refcounts(strip), without_refcounts(buffer), without_refcounts(world)
     lighting, ground, pixels = without_refcounts(lighting), without_refcounts(ground), without_refcounts(pixels)
-    width, has_floor = pixels.shape[1], ground.light.size > 0
+    width = pixels.shape[1]
     aside, to_floor = np.empty(width, dtype=np.float32), floor_form(strip, ground)
-    lit, share, across, along, value, texel = row_buffers(width)
+    close, lit, share, across, along, value, texel = row_buffers(width)
     for x in range(width):
         aside[x] = np.float32((x + 0.5 - strip.middle_x) / strip.scale)
+    row = PixelRow(aside, close, lit, share, across, along, value, texel)
     for number in range(rows[0], rows[1]):
-        row = PixelRow(aside, buffer.inverse_depth[number], lit, share, across, along, value, texel)
         y = (number + 0.5 - strip.middle_y) / strip.scale
-        find_floor(y, strip, ground, buffer.id[number], row)
-        light_row(y, lighting, row)
+        find_floor(y, strip, ground, buffer.inverse_depth[number], row)
+        light_row(_seen_span(row.close), y, lighting, row)
         first = 0
         while first < width:
-            last, kind = _run(buffer, number, first, world[2])
+            last, kind = _run(buffer, number, first, row.close, world[2])
             span, out = (first, last, y), pixels[number]
             if kind >= 0:
                 which = buffer.id[number, first], buffer.primitive[number, first], kind
                 _shade_instance(span, which, strip, world, lighting, ground.colours[0], row, out)
-            elif has_floor:
+            elif row.close[first] > 0.0:
                 shade_floor(span, number, to_floor, ground, row, out)
             else:
                 shade_nothing(span, ground, out)
@@ -143,12 +140,28 @@ def _shade_rows(rows, strip, buffer, world, lighting, ground, pixels):
 
 
 @kernel
-def _run(buffer, number, first, tables):
-    """Past the last pixel of a row that sees the same as ``first``, and how that is drawn, -1 if it is nothing."""
+def _seen_span(close):
+    """The first pixel of a row that sees something, and past the last."""
+    first, last = 0, len(close)
+    while first < last and close[first] <= 0.0:
+        first += 1
+    while first < last and close[last - 1] <= 0.0:
+        last -= 1
+    return first, last
+
+
+@kernel
+def _run(buffer, number, first, close, tables):
+    """Past the last pixel of a row that sees the same as ``first``, and how that is drawn, -1 if by no instance."""
     ids, primitive = buffer.id[number], buffer.primitive[number]
     i, p, last = ids[first], primitive[first], first + 1
-    kind = -1 if i < 0 else drawn_as(tables.shapes.shape[tables.body[i].shape])
-    if kind <= BALL:  # of which there is one primitive
+    if i < 0:
+        nothing = close[first] <= 0.0
+        while last < len(ids) and ids[last] < 0 and (close[last] <= 0.0) == nothing:
+            last += 1
+        return last, -1
+    kind = drawn_as(tables.shapes.shape[tables.body[i].shape])
+    if kind == BALL:  # of which there is one primitive
         while last < len(ids) and ids[last] == i:
             last += 1
     else:

@@ -20,53 +20,59 @@ _TINY = np.float32(1e-12)
 
 
 class Ground(NamedTuple):
-    """The background, and the floor before it.
+    """The background, and the floor before it, which is seen from above only: from below one looks through it.
 
     Parameters
     ----------
     colours : (3, 3) float64
         sRGB 0 .. 1, row by row of the background, and of the floor in the key light and in the shadow.
-    area : (4,) float64
-        Half the width of the world along x and y, the height of the floor, and the width of the rim over which it
-        fades [m].
+    lower, upper : (2,) float64
+        Corners of the floor, between which it is whole [m].
+    height, rim : float
+        Its z, and the width of the rim around it over which it fades [m].
     light : (b, a) float32
-        Share of the light that reaches the floor, from its corner (-x, -y) to (x, y), rims included; (0, 0) if there is
-        no floor.
+        Share of the light that reaches the floor, from its lower corner to its upper one, rims included; (0, 0) if
+        there is no floor.
     """
 
     colours: np.ndarray
-    area: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    height: float
+    rim: float
     light: np.ndarray
 
 
 @kernel
-def find_floor(y, strip, ground, ids, row):
-    """Find the floor in a row, of whose rays ``y`` is the same: its inverse depth, and how much of it is seen.
+def find_floor(y, strip, ground, seen, row):
+    """Find the floor in a row, of whose rays ``y`` is the same, where no instance is seen.
 
-    They go to ``row.close``, which is 0 where a pixel sees nothing, and to ``row.share``.
+    ``seen``: inverse depth of the instances. ``row.close`` becomes that of what each pixel sees, 0 where that is
+    nothing, and ``row.share`` how much it shows of the floor.
     """
-    nothing = ground.light.size == 0
+    below = ground.height - strip.eye[2]
+    nothing = ground.light.size == 0 or below >= 0.0
     up, east, north = _along(strip, 2), _along(strip, 0), _along(strip, 1)
-    below = ground.area[2] - strip.eye[2]
-    per = np.float32(1.0 / below if below != 0.0 else 0.0)
-    half_x, half_y, rim = np.float32(ground.area[0]), np.float32(ground.area[1]), np.float32(ground.area[3])
-    v = np.float32(y)
+    per = np.float32(0.0 if nothing else 1.0 / below)
+    half_x, middle_x = _half_and_middle(ground, 0)
+    half_y, middle_y = _half_and_middle(ground, 1)
+    east_off, north_off, rim, v = east[3] - middle_x, north[3] - middle_y, np.float32(ground.rim), np.float32(y)
     aside, close, share = row.aside, row.close, row.share
-    for k in range(len(ids)):
+    for k in range(len(seen)):
         here = (up[0] * aside[k] + (up[1] * v + up[2])) * per
         depth = ONE / max(here, _TINY)
-        past_x = max(abs((east[0] * aside[k] + (east[1] * v + east[2])) * depth + east[3]) - half_x, NONE)
-        past_y = max(abs((north[0] * aside[k] + (north[1] * v + north[2])) * depth + north[3]) - half_y, NONE)
+        past_x = max(abs((east[0] * aside[k] + (east[1] * v + east[2])) * depth + east_off) - half_x, NONE)
+        past_y = max(abs((north[0] * aside[k] + (north[1] * v + north[2])) * depth + north_off) - half_y, NONE)
         past = min(math.sqrt(past_x * past_x + past_y * past_y) / rim, ONE)
         left = ONE - past * past * (np.float32(3.0) - TWO * past)
         left = NONE if nothing or here <= NONE else left
         share[k] = left
-        close[k] = close[k] if ids[k] >= 0 else (here if left > NONE else NONE)
+        close[k] = seen[k] if seen[k] > NONE else (here if left > NONE else NONE)
 
 
 @kernel
 def shade_floor(span, number, to_map, ground, row, pixels):
-    """Shade some pixels of a row, ``pixels`` (width,) int32, that see the floor or nothing.
+    """Shade some pixels of a row, ``pixels`` (width,) int32, that see the floor.
 
     ``span``: the first, past the last, y of their rays; ``number`` of the row; ``to_map``: see ``floor_form``.
     """
@@ -98,10 +104,11 @@ def floor_form(strip, ground):
     form = np.zeros((3, 4))
     for axis in range(2):
         points = ground.light.shape[1 - axis]
-        scale = 0.5 * points / (ground.area[axis] + ground.area[3])
+        start = ground.lower[axis] - ground.rim
+        scale = points / (ground.upper[axis] + ground.rim - start)
         for k in range(3):
             form[axis, k] = scale * strip.axes[k, axis]
-        form[axis, 3] = scale * strip.eye[axis] + 0.5 * points - 0.5
+        form[axis, 3] = scale * (strip.eye[axis] - start) - 0.5
     return form
 
 
@@ -110,6 +117,13 @@ def shade_nothing(span, ground, pixels):
     """Fill some pixels of a row with the background."""
     back = single(ground.colours[0])
     pixels[span[0] : span[1]] = packed(back[0], back[1], back[2])
+
+
+@kernel
+def _half_and_middle(ground, axis):
+    """Half the width of the whole floor along an axis, and its middle."""
+    lower, upper = ground.lower[axis], ground.upper[axis]
+    return np.float32(0.5 * (upper - lower)), np.float32(0.5 * (upper + lower))
 
 
 @kernel

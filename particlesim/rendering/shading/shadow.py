@@ -61,19 +61,24 @@ def _fill_bounds(found, first, last):
 
 
 @kernel
-def light_row(y, lighting, row):
-    """Fill in ``row.lit``; ``y`` of the rays of this row. Beyond the map all is lit."""
+def light_row(span, y, lighting, row):
+    """Fill in ``row.lit`` for a span of pixels, the first to before the last, of whose rays ``y`` is the same.
+
+    Beyond the map all is lit.
+    """
     height, width = lighting.shadow.closeness.shape
-    locate((0, len(row.lit), y), lighting.to_map, (width, height), _TEXELS, row)
+    first, last = span
+    locate((first, last, y), lighting.to_map, (width, height), _TEXELS, row)
     least, most = lighting.shadow.least.reshape(-1), lighting.shadow.most.reshape(-1)
-    lit, value, texel = row.lit, row.value, row.texel
+    lit, value, texel = row.lit[first:last], row.value[first:last], row.texel[first:last]
+    across, along = row.across[first:last], row.along[first:last]
     for k in range(len(lit)):
         lit[k] = ONE if most[texel[k]] <= value[k] else (NONE if least[texel[k]] > value[k] else HALF)
     # What is all lit or all dark is most, and found. The rest is looked at texel by texel.
     closeness = lighting.shadow.closeness.reshape(-1)
     for k in range(len(lit)):
         if lit[k] == HALF:
-            lit[k] = _share_lit(closeness, width, texel[k], value[k], (row.across[k], row.along[k]))
+            lit[k] = _share_lit(closeness, width, texel[k], value[k], (across[k], along[k]))
 
 
 @kernel
