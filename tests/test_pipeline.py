@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 import particlesim as ps
+from particlesim.jobs.frame_source import frame_source, frames_ahead
+from particlesim.rendering.look import look_of
+from particlesim.trajectory.gsd_file import Trajectory
 from tests.worlds import gas, listed, quick_twin, scene
 
 SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))
@@ -47,8 +50,11 @@ def test_a_movie_has_its_frames_and_shows_its_particles(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["movie.mp4", "movie.png"]
 
 
-def test_a_trajectory_renders_to_the_movie_of_its_scene(tmp_path):
+@pytest.mark.parametrize("colour", ["by_shape", "by_speed"])
+def test_a_trajectory_renders_to_the_movie_of_its_scene(tmp_path, colour):
     s = gas(5, **SMALL)
+    for group in s.particles:
+        group.colour = colour
     written = ps.simulate(s, tmp_path / "run.gsd")
     direct = ps.render(s, tmp_path / "direct.mp4")
     read = ps.render(tmp_path / "run.gsd", tmp_path / "read.mp4")
@@ -58,6 +64,24 @@ def test_a_trajectory_renders_to_the_movie_of_its_scene(tmp_path):
     # Single precision moves an edge by far less than a pixel.
     assert a.shape == b.shape
     assert np.abs(a - b).mean() < 0.1
+
+
+def test_a_scale_is_settled_by_the_run_and_not_by_its_start(tmp_path):
+    # At rest at first, and at 4.9 m/s when it has fallen for half a second.
+    ball = listed("sphere", {"position": (0, 0, 0)}, colour="by_speed")
+    s = scene(ball, size=(6, 6, 6), boundary="open", gravity=(0, 0, -9.81), **SMALL)
+    source = frame_source(s, None, None, None)
+    calls = []
+    frames, sample = frames_ahead(source, source.frames, lambda *call: calls.append(call))
+    assert [number for number, _ in frames] == list(range(6)) and calls[-1] == ("simulating", 6, 6)
+    (field,) = look_of(s, source.header, source.first, sample).colours.fields
+    assert (field.low, field.high) == (0.0, 5.0)
+    ps.simulate(s, tmp_path / "run.gsd")
+    with Trajectory(tmp_path / "run.gsd") as stored:
+        late = frame_source(stored, range(4, 6), None, None)
+        frames, sample = frames_ahead(late, late.frames, None)
+        assert [number for number, _ in frames] == [4, 5]
+        assert [frame.time for frame in sample] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
 
 
 def test_the_same_scene_gives_the_same_bytes(tmp_path):

@@ -6,7 +6,16 @@ import pytest
 from particlesim.geometry import shapes
 from particlesim.rendering.gl import geometry
 from particlesim.rendering.octree_cells import cell_lines
-from particlesim.rendering.shading.colour import PALETTE, ParticleColours, map_colours, parse, shape_colours
+from particlesim.rendering.shading.colour import (
+    PALETTE,
+    ParticleColours,
+    luminance,
+    map_begin,
+    map_colours,
+    palette_colour,
+    parse,
+    shape_colours,
+)
 from particlesim.rendering.shading.fields import field_of, figures
 from particlesim.scene import Scene
 from particlesim.trajectory.frames import Frame, Header
@@ -47,12 +56,20 @@ def test_each_shape_keeps_its_colour_whatever_else_is_there():
 def test_more_shapes_than_colours_still_have_one_each():
     many = shape_colours(header(["pyramid"] * 12, range(12)))
     assert many.shape == (12, 3)
-    assert len(np.unique(many[: len(PALETTE)], axis=0)) == len(PALETTE)
+    assert len(np.unique(many, axis=0)) == 12
+
+
+def test_thirty_five_groups_differ_in_colour_and_the_first_are_the_palette():
+    colours = np.array([palette_colour(number) for number in range(35)])
+    assert np.array_equal(colours[:7] ** 2, [parse(colour) for colour in PALETTE])
+    assert ((colours >= 0.0) & (colours <= 1.0)).all()
+    apart = np.linalg.norm(colours[:, None] - colours[None], axis=2) + 9.0 * np.eye(35)
+    assert apart.min() > 0.06 and apart[:21, :21].min() > 0.13
 
 
 def test_groups_and_names():
     some = scene("by_group", "by_group", "#804020", "steelblue")
-    colours = ParticleColours(some, header(["sphere"], [0] * 5, [0, 1, 2, 3, 0]), frame(np.zeros((5, 3))))
+    colours = ParticleColours(some, header(["sphere"], [0] * 5, [0, 1, 2, 3, 0]), [frame(np.zeros((5, 3)))])
     rgb = of_all(colours, frame(np.zeros((5, 3))))
     assert rgb.dtype == np.float32
     assert rgb[0] == pytest.approx(parse(PALETTE[0])) and np.array_equal(rgb[0], rgb[4])
@@ -64,10 +81,10 @@ def test_groups_and_names():
 def test_speed_colours_grow_lighter_and_their_scale_stays():
     moving = scene("by_speed", "red")
     first = frame([[1.0, 0, 0], [0, 0, 0], [0, 1.0, 0]])
-    colours = ParticleColours(moving, header(["sphere"], [0, 0, 0], [0, 1, 0]), first)
+    colours = ParticleColours(moving, header(["sphere"], [0, 0, 0], [0, 1, 0]), [first])
     before = of_all(colours, first).copy()
-    faster = of_all(colours, frame([[2.0, 0, 0], [9.0, 0, 0], [0, 1.0, 0]])).copy()
-    assert faster[0].sum() > before[0].sum()
+    faster = of_all(colours, frame([[0.5, 0, 0], [9.0, 0, 0], [0, 1.0, 0]])).copy()
+    assert faster[0].sum() < before[0].sum()
     assert np.array_equal(before[2], faster[2])
     assert np.array_equal(before[1], faster[1])
     lightness = map_colours(np.linspace(0.0, 1.0, 200)) @ [0.2126, 0.7152, 0.0722]
@@ -77,7 +94,7 @@ def test_speed_colours_grow_lighter_and_their_scale_stays():
 def test_speed_colours_of_particles_that_start_at_rest():
     rest = frame(np.zeros((1, 3)))
     for gravity in ((0.0, 0.0, 0.0), (0.0, 0.0, -9.81)):
-        colours = ParticleColours(scene("by_speed", gravity=gravity), header(["sphere"], [0]), rest)
+        colours = ParticleColours(scene("by_speed", gravity=gravity), header(["sphere"], [0]), [rest])
         still = of_all(colours, rest).copy()
         assert np.all(np.isfinite(still))
         assert not np.array_equal(still, of_all(colours, frame([[0.5, 0.0, 0.0]])))
@@ -89,7 +106,7 @@ def test_each_field_colours_its_own_groups():
     head.size[:] = 1.0, 1.0, 2.0, 3.0, 4.0
     start = frame(np.zeros((5, 3)))
     start.position[:, 2] = -2.0, 2.0, 0.0, 0.0, 0.0
-    colours = ParticleColours(mixed, head, start)
+    colours = ParticleColours(mixed, head, [start])
     assert [field.name for field in colours.fields] == ["height", "size"]
     rgb = np.sqrt(of_all(colours, start))
     assert rgb[:2] == pytest.approx(map_colours(np.array([0.0, 1.0])), abs=1e-6)
@@ -100,54 +117,82 @@ def test_each_field_colours_its_own_groups():
 
 def test_impacts_colour_those_who_had_them():
     quiet = frame(np.zeros((3, 3)))
-    colours = ParticleColours(scene("by_impacts", span=(0.0, 10.0)), header(["sphere"], [0, 0, 0]), quiet)
+    colours = ParticleColours(scene("by_impacts", span=(0.0, 10.0)), header(["sphere"], [0, 0, 0]), [quiet])
     quiet.impacts[:] = 0, 5, 50
     rgb = np.sqrt(of_all(colours, quiet))
     assert rgb == pytest.approx(map_colours(np.array([0.0, 0.5, 1.0])), abs=2e-3)
 
 
-def test_scales_are_given_or_settled_by_the_first_frame():
-    head = header(["sphere"], [0, 0])
-    start = frame([[3.0, 0.0, 0.0], [0.0, 4.0, 0.0]])
-    start.position[:, 2] = 7.0, 9.0
+def test_scales_are_given_or_settled_by_what_the_particles_come_to():
+    head = header(["sphere"], [0] * 100)
+    speeds = np.zeros((100, 3))
+    speeds[:, 0] = np.arange(100) / 50.0
+    frames = [frame(factor * speeds) for factor in (1.0, 2.0)]
+    for some in frames:
+        some.position[:, 2] = np.linspace(7.0, 9.0, 100)
+    frames[1].impacts[:] = np.arange(100)
+    frames[1].impacts[99] = 10**6
 
     def scale(kind, **settings):
-        field = field_of(kind, scene(kind, **settings), head, start)
+        field = field_of(kind, scene(kind, **settings), head, frames)
         return field.low, field.high
 
-    assert scale("by_speed") == pytest.approx((0.0, np.sqrt(4.0 * 12.5)))
-    assert scale("by_speed", gravity=(0.0, 0.0, -2.0)) == pytest.approx((0.0, np.sqrt(4.0 * 12.5 + 16.0)))
+    # All but one in fifty are slower than 3.86 m/s; the next round end is 4.
+    assert scale("by_speed") == scale("by_speed", gravity=(0.0, 0.0, -2.0)) == (0.0, 4.0)
     assert scale("by_speed", span=(1.0, 5.0)) == (1.0, 5.0)
     assert scale("by_height") == (-2.0, 2.0)
-    assert scale("by_height", boundary="open") == (7.0, 9.0)
+    assert scale("by_height", boundary="open") == pytest.approx((7.0, 9.0))
     assert scale("by_size") == (0.5, 1.5)  # all are of size 1
-    # In 10 s at 3.5 m/s: two spheres of 1 m in 4 m^3; walls 1, 1 and 4 m apart.
-    assert scale("by_impacts", boundary="open") == (0.0, round(70.0 * np.sqrt(2.0) * np.pi * 2.0 / 4.0))
-    assert scale("by_impacts") == (0.0, round(70.0 * (np.sqrt(2.0) * np.pi * 2.0 / 4.0 + 2.25 / 2.0)))
+    # Impacts add up: those of the last frame count, and not the one who had a million.
+    assert scale("by_impacts") == (0.0, 100.0)
+
+
+def test_most_particles_of_a_gas_are_neither_at_the_dark_end_nor_beyond_the_bright_one():
+    rng = np.random.default_rng(1)
+    gas = frame(rng.normal(size=(5000, 3)))
+    field = field_of("by_speed", scene("by_speed"), header(["sphere"], [0] * 5000), [gas])
+    fractions = field.fractions(None, gas, np.arange(5000))
+    assert np.median(fractions) == pytest.approx(0.45, abs=0.1) and (fractions > 1.0).mean() < 0.02
+
+
+@pytest.mark.parametrize("background", ["#000000", "#0b0e14", "#10141b", "#203040", "#f3f2ef", "#ffffff", "#808080"])
+def test_both_ends_of_a_scale_stand_off_from_the_background(background):
+    behind = np.sqrt(parse(background))
+    begin = map_begin(behind)
+    ends = map_colours(np.array([0.0, 1.0]), begin)
+    light = luminance(np.vstack([behind, ends])) + 0.05
+    if light[0] < 0.1:
+        assert light[1] / light[0] >= 2.45 and light[2] / light[0] > 5.0
+    else:
+        assert begin == 0.0
 
 
 @pytest.mark.parametrize(
     ("low", "high", "texts"),
     [
-        (0.0, 7.4, ["0.0", "2.5", "5.0"]),
+        (0.0, 7.0, ["0.0", "3.5", "7.0"]),
         (0.0, 10.0, ["0", "5", "10"]),
-        (-2.0, 2.0, ["-2", "0", "2"]),
-        (0.1, 0.34, ["0.1", "0.2", "0.3"]),
+        (0.0, 60.0, ["0", "20", "40", "60"]),
+        (0.0, 1.2, ["0.0", "0.3", "0.6", "0.9", "1.2"]),
+        (-2.0, 2.0, ["-2", "-1", "0", "1", "2"]),
+        (0.1, 0.34, ["0.10", "0.16", "0.22", "0.28", "0.34"]),
         (1000.1, 1000.2, ["1000.10", "1000.15", "1000.20"]),
+        (0.0, 7.43712, ["0.000", "1.859", "3.719", "5.578", "7.437"]),
         (0.0, 3e7, ["0", "1e+07", "2e+07", "3e+07"]),
         (1e-5, 4e-5, ["1e-05", "2e-05", "3e-05", "4e-05"]),
     ],
 )
-def test_figures_on_a_scale_are_round(low, high, texts):
+def test_figures_on_a_scale_are_short_and_at_both_ends(low, high, texts):
     assert [text for _, text in figures(low, high)] == texts
 
 
-def test_every_scale_has_three_to_five_figures_on_it():
+def test_every_scale_has_three_to_five_figures_on_it_and_one_at_each_end():
     rng = np.random.default_rng(2)
     for low, width in zip(rng.normal(0.0, 10.0, 500), 10.0 ** rng.uniform(-3, 5, 500), strict=True):
         values = [value for value, _ in figures(low, low + width)]
         assert 3 <= len(values) <= 5
-        assert low - 1e-6 * width <= values[0] and values[-1] <= low + width * (1 + 1e-6)
+        assert values[0] == pytest.approx(low) and values[-1] == pytest.approx(low + width)
+        assert np.diff(values) == pytest.approx(np.full(len(values) - 1, width / (len(values) - 1)))
 
 
 def test_cells_have_twelve_edges_each():

@@ -12,7 +12,7 @@ from particlesim.rendering.hud.overlay import Overlay, legend_places
 from particlesim.rendering.hud.panel import Panel, Style
 from particlesim.rendering.hud.readout import energy_change, pressure, readout_rows
 from particlesim.rendering.look import look_of
-from particlesim.rendering.shading.colour import PALETTE, encoded, map_colours
+from particlesim.rendering.shading.colour import PALETTE, encoded, map_colours, palette_colour
 from particlesim.scene import Scene
 from particlesim.trajectory.frame_aabb import frame_boxes
 from particlesim.trajectory.frames import Frame, Header
@@ -244,6 +244,34 @@ def test_swatches_name_groups_and_shapes_once_each():
     assert [swatch.name for swatch in named] == ["sphere", "group 3", "e = 1"]
     assert named[1].colour == pytest.approx(encoded(PALETTE[2]))
     assert named[2].colour == pytest.approx([1.0, 0x80 / 255, 0.0])
+
+
+@pytest.mark.parametrize(("count", "lines"), [(14, 14), (30, 30), (50, 32)])
+def test_a_legend_names_all_groups_or_says_how_many_more_there_are(count, lines):
+    groups = [{"shape": "sphere", "count": 1, "colour": "by_group", "name": f"g{k}"} for k in range(count)]
+    scene = make_scene(*groups, readout=False, legend=True)
+    image = drawn(scene, make_frame(count), header=make_header(count, np.arange(count)))[1]
+    shown = [
+        k
+        for k in range(min(count, 35))
+        if (np.abs(image - 255.0 * palette_colour(k)).max(axis=2) <= 1.0).sum() >= 0.9 * round(0.8 * 18.72) ** 2
+    ]
+    assert shown == list(range(min(count, lines - (count > lines))))
+
+
+def test_values_of_a_scale_are_in_the_middle_below_their_marks():
+    image = drawn(make_scene(SPEED, readout=False), make_frame())[1]
+    panel = image[10:200, 900:].astype(int)
+    panel[(panel == 120).all(axis=2)] = 0  # what is not panel
+    bar = np.flatnonzero((np.ptp(panel, axis=2) > 60).sum(axis=1) > 100)
+    columns = np.flatnonzero((np.ptp(panel[bar], axis=2) > 60).any(axis=0))
+    mark = np.flatnonzero((panel[bar[-1] + 2] > panel[bar[-1] + 2].min() + 60).all(axis=1))
+    # The outermost marks are at the ends of the bar.
+    assert abs(mark.min() - columns.min()) <= 2 and abs(mark.max() - columns.max()) <= 2
+    inked = (panel[bar[-1] + 6 : bar[-1] + 26] > 150).all(axis=2).any(axis=0).nonzero()[0]
+    for end in (mark.min(), mark.max()):
+        near = inked[np.abs(inked - end) < 12]
+        assert abs(0.5 * (near.min() + near.max()) - end) <= 1.5
 
 
 def test_legends_that_do_not_fit_are_left_out():

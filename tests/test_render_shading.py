@@ -203,7 +203,9 @@ def test_the_floor_has_its_colours_and_fades_into_the_background():
 
 
 def test_the_floor_is_seen_from_above_only():
-    ground = Ground(np.array([BACKGROUND, [0.9] * 3, [0.4] * 3]), -CORNER, CORNER, -1.0, 1.0, np.ones((2, 2), np.float32))
+    ground = Ground(
+        np.array([BACKGROUND, [0.9] * 3, [0.4] * 3]), -CORNER, CORNER, -1.0, 1.0, np.ones((2, 2), np.float32)
+    )
     balls = crowd(3, 20, 2.0, 0.4, 0.9, kinds=1)
     for height, seen in ((1.0, True), (-1.0, False), (-4.0, False)):
         view = projection((9.0, 3.0, height))

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import bisect
+import itertools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from particlesim.scene import Scene
 from particlesim.simulation.simulation import Simulation
 from particlesim.trajectory.frames import Frame, Header
 from particlesim.trajectory.gsd_file import Trajectory
+
+# Memory for frames that are simulated before the first is drawn [bytes], and how many are looked at.
+_AHEAD = 2**28
+_SPREAD = 33
 
 # Called with what is going on, how many frames are done, and how many there will be.
 Progress = Callable[[str, int, int], None]
@@ -27,6 +34,25 @@ class FrameSource(NamedTuple):
     total: int  # how many there are of them
     wanted: range  # numbers of those that are to be drawn
     phase: str  # what takes the time until the next
+    trajectory: Trajectory | None = None  # that they are read from, if they are
+
+
+def frames_ahead(
+    source: FrameSource, frames: Iterator[tuple[int, Frame]], progress: Progress | None
+) -> tuple[Iterator[tuple[int, Frame]], list[Frame]]:
+    """The frames of a source, and those of the run that tell before the first is drawn how its particles fare.
+
+    They are spread over the whole of a trajectory; a scene is simulated ahead, as far as memory is to be had.
+    """
+    if source.trajectory is not None:
+        stored = source.trajectory
+        return frames, [stored[k] for k in _spread_over(len(stored))]
+    size = sum(value.nbytes for value in vars(source.first).values() if isinstance(value, np.ndarray))
+    held = []
+    for number, frame in itertools.islice(frames, max(1, _AHEAD // max(size, 1))):
+        held.append((number, frame))
+        tell(progress, source.phase, number + 1, source.total)
+    return itertools.chain(held, frames), [held[k][1] for k in _spread_over(len(held))]
 
 
 @contextmanager
@@ -49,7 +75,7 @@ def frame_source(
     if isinstance(source, Trajectory):
         wanted = _among(wanted, len(source))
         stored = ((k, source[k]) for k in wanted)
-        return FrameSource(source.scene, source.header, source[0], stored, len(wanted), wanted, "reading")
+        return FrameSource(source.scene, source.header, source[0], stored, len(wanted), wanted, "reading", source)
     wanted = _among(wanted, source.frames)
     simulation = start(source, threads, progress)
     total = max(wanted) + 1
@@ -94,6 +120,11 @@ def tell(progress: Progress | None, phase: str, done: int, total: int) -> None:
     """Say how far the work is, if it is to be said."""
     if progress is not None:
         progress(phase, done, total)
+
+
+def _spread_over(count: int) -> list[int]:
+    """Some of ``count`` numbers, the first and the last among them."""
+    return [int(k) for k in np.unique(np.linspace(0, count - 1, _SPREAD).round())]
 
 
 def _among(wanted: range | None, total: int) -> range:

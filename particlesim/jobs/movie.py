@@ -17,6 +17,7 @@ from particlesim.jobs.frame_source import (
     Progress,
     frame_source,
     frame_source_until,
+    frames_ahead,
     frames_of,
     opened,
     start,
@@ -28,6 +29,7 @@ from particlesim.rendering.gl import platform
 from particlesim.rendering.hud.history import History
 from particlesim.rendering.look import look_of
 from particlesim.rendering.shading.colour import encoded
+from particlesim.rendering.shading.fields import is_settled_by_frames
 from particlesim.rendering.video.fade import faded, strength
 from particlesim.scene import Scene
 from particlesim.setup.build import contact_laws_of
@@ -189,8 +191,12 @@ class MovieJob:
 
     def __init__(self, source: FrameSource, scene: Scene, progress: Progress | None) -> None:
         self._source, self._movie, self._progress = source, scene.movie, progress
-        self._drawers = Drawers(look_of(scene, source.header, source.first), len(source.wanted))
         self.summary = _summary(scene, source.header)
+        self._frames = _timed(self.summary, source.phase, source.frames)
+        sample: list[Frame] = []
+        if is_settled_by_frames(scene):
+            self._frames, sample = frames_ahead(source, self._frames, progress)
+        self._drawers = Drawers(look_of(scene, source.header, source.first, sample), len(source.wanted))
         self.poster = np.zeros((0, 0, 3), dtype=np.uint8)  # of the movie that images() gives
 
     def __enter__(self) -> MovieJob:
@@ -217,7 +223,7 @@ class MovieJob:
         """The frames to draw, each with what its readout needs of those drawn before it."""
         source, summary = self._source, self.summary
         history = History().then(source.first.ledger)
-        for number, frame in _timed(summary, source.phase, source.frames):
+        for number, frame in self._frames:
             summary.add(frame)
             if number in source.wanted:
                 yield frame, history

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from particlesim.core.constants import DISSIPATION
@@ -40,13 +41,16 @@ class Look:
     causes: tuple[str, ...]
 
 
-def look_of(scene: Scene, header: Header, first: Frame) -> Look:
-    """The look of a movie of these particles whose first frame, at the start of the run, is ``first``."""
+def look_of(scene: Scene, header: Header, first: Frame, frames: Sequence[Frame] = ()) -> Look:
+    """The look of a movie of these particles whose first frame, at the start of the run, is ``first``.
+
+    ``frames``: what scales are settled by where the scene leaves them open, in the order of time; ``first`` if none.
+    """
     return Look(
         scene=scene,
         header=header,
         subject=subject_box(scene, header, first),
-        colours=ParticleColours(scene, header, first),
+        colours=ParticleColours(scene, header, frames or (first,)),
         start=first.ledger,
         causes=_causes(scene),
     )

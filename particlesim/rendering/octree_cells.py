@@ -15,11 +15,14 @@ from particlesim.trajectory.frames import Frame
 _DEEPEST = 8
 
 
-def cell_lines(lower: np.ndarray, upper: np.ndarray, depth: np.ndarray, width: float) -> np.ndarray:
-    """Lines (see gl.geometry) for boxes ``lower`` .. ``upper`` (k, 3) [m] of ``depth`` (k,); ``width`` [pixels]."""
+def cell_lines(lower: np.ndarray, upper: np.ndarray, depth: np.ndarray, width: float, begin: float = 0.0) -> np.ndarray:
+    """Lines (see gl.geometry) for boxes ``lower`` .. ``upper`` (k, 3) [m] of ``depth`` (k,); ``width`` [pixels].
+
+    ``begin``: see ``map_colours``.
+    """
     start, end = geometry.box_edges(np.asarray(lower), np.asarray(upper))
     colour = np.empty((len(depth), 4))
-    colour[:, :3] = map_colours(np.asarray(depth) / _DEEPEST)
+    colour[:, :3] = map_colours(np.asarray(depth) / _DEEPEST, begin)
     colour[:, 3] = 0.35
     return geometry.lines(start.reshape(-1, 3), end.reshape(-1, 3), np.repeat(colour, 12, axis=0), width)
 

@@ -128,7 +128,8 @@ class Renderer:
         width = self._quality.samples * max(1.0, self._size[1] / 720.0)
         rows = [self._environment.box_lines(view, _BOX_LINE * width)]
         if scene.show.cells:
-            rows.insert(0, cell_lines(*octree_cells(scene, frame), width=_CELL_LINE * width))
+            cells = octree_cells(scene, frame)
+            rows.insert(0, cell_lines(*cells, width=_CELL_LINE * width, begin=self._look.colours.begin))
         self._lines.put(np.vstack(rows))
 
     def _view_block(self, view: View) -> np.ndarray:

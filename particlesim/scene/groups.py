@@ -355,7 +355,7 @@ class Group(Surface):
     velocity: Velocity = Field(default_factory=lambda: Rest(kind="rest"))
     spin: Spin = Field(default_factory=lambda: Rest(kind="rest"))
     colour: Annotated[Text, colour_or("by_shape", "by_group", *FIELDS)] = "by_shape"
-    colour_range: Range | None = None  # of the field's scale; settled by the first frame if not given
+    colour_range: Range | None = None  # of the field's scale; settled by the run if not given
 
     @model_validator(mode="after")
     def _consistent(self) -> Group:

@@ -7,7 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.rendering.hud.panel import Panel, Style
-from particlesim.rendering.shading.colour import PALETTE, ParticleColours, encoded, map_colours, shape_colours
+from particlesim.rendering.shading.colour import (
+    ParticleColours,
+    encoded,
+    map_colours,
+    palette_colour,
+    shape_colours,
+)
 from particlesim.rendering.shading.fields import Field, figures
 from particlesim.scene import Scene
 from particlesim.scene.groups import FIELDS
@@ -16,8 +22,11 @@ from particlesim.trajectory.frames import Header
 # Width of a scale, height of its bar and of the marks below it, and edge of a swatch, in heights of letters.
 _SCALE, _BAR, _MARK, _SWATCH = 11.0, 0.7, 0.25, 0.8
 
-# More names than this are left out: they would hide the picture.
-_MOST_SWATCHES = 12
+# Names take this share of the picture's height at the most, in so many columns; what is left is said in a line.
+_NAMES, _COLUMNS = 0.6, 2
+
+# Letters of a name that are shown: more would hide the picture.
+_LETTERS = 28
 
 
 class Swatch(NamedTuple):
@@ -31,9 +40,10 @@ def legend_panels(scene: Scene, header: Header, colours: ParticleColours, style:
     """The legends that the scene wants: a scale for each field; if it asks for legends, the names of colours too."""
     if scene.show.legend is False:
         return []
-    panels = [_scale_panel(field, style) for field in colours.fields]
+    panels = [_scale_panel(field, colours.begin, style) for field in colours.fields]
     named = swatches(scene, header) if scene.show.legend else []
-    return [*panels, _swatch_panel(named[:_MOST_SWATCHES], style)] if named else panels
+    rows = max(1, int(_NAMES * scene.movie.size[1] / style.line))
+    return [*panels, _swatch_panel(named, rows, style)] if named else panels
 
 
 def swatches(scene: Scene, header: Header) -> list[Swatch]:
@@ -49,7 +59,7 @@ def swatches(scene: Scene, header: Header) -> list[Swatch]:
             shape = int(header.shape[members[0]])
             found.append(Swatch(of_shapes[shape], header.shapes[shape].name))
         elif group.colour == "by_group":
-            found.append(Swatch(encoded(PALETTE[number % len(PALETTE)]), name))
+            found.append(Swatch(palette_colour(number), name))
         else:
             found.append(Swatch(encoded(group.colour), name))
     # Groups of one shape share a line.
@@ -60,34 +70,54 @@ def _same(one: Swatch, other: Swatch) -> bool:
     return one.name == other.name and np.array_equal(one.colour, other.colour)
 
 
-def _scale_panel(field: Field, style: Style) -> Panel:
-    """Name and unit, a bar with the colours of the scale, and round values below it."""
+def _scale_panel(field: Field, begin: float, style: Style) -> Panel:
+    """Name and unit, a bar with the colours of the scale, and values in the middle below their marks."""
     em, pad = style.em, style.pad
     width, bar, mark = round(_SCALE * em), round(_BAR * em), max(2, round(_MARK * em))
     panel = Panel(style, 2 * style.line + bar + mark + 2 * pad, width + 2 * pad)
     panel.write(f"{field.name} [{field.unit}]" if field.unit else field.name, pad, pad, faint=True)
-    top = pad + style.line
-    colours = 255.0 * map_colours(np.linspace(0.0, 1.0, width))
-    panel.fill(np.tile(colours, (bar, 1, 1)), pad, top)
+    labels = figures(field.low, field.high)
+    # At both ends there is room for half of the value there.
+    left, right = (style.width(text) // 2 for _, text in (labels[0], labels[-1]))
+    start, top, width = pad + left, pad + style.line, width - left - right
+    colours = 255.0 * map_colours(np.linspace(0.0, 1.0, width), begin)
+    panel.fill(np.tile(colours, (bar, 1, 1)), start, top)
     thick = max(1, round(0.08 * em))
-    for value, text in figures(field.low, field.high):
-        place = round((value - field.low) / (field.high - field.low) * (width - thick))
-        panel.fill(np.tile(style.faint, (mark, thick, 1)), pad + place, top + bar)
-        # In the middle below its mark, as far as the panel goes.
-        wide = style.width(text)
-        left = min(max(place - wide // 2, -pad // 2), width + pad // 2 - wide)
-        panel.write(text, pad + left, top + bar + mark + round(0.1 * em))
+    for middle, text in _apart(labels, field, width - 1, style):
+        panel.fill(np.tile(style.faint, (mark, thick, 1)), start + middle - thick // 2, top + bar)
+        panel.write(text, start + middle - style.width(text) // 2, top + bar + mark + round(0.1 * em))
     return panel
 
 
-def _swatch_panel(named: list[Swatch], style: Style) -> Panel:
-    """A patch of colour and a name on each line."""
+def _apart(labels: list[tuple[float, str]], field: Field, width: int, style: Style) -> list[tuple[int, str]]:
+    """Where the marks of values are on a bar [pixels], with the values: both ends, and those that do not run together."""
+    places = [(round((value - field.low) / (field.high - field.low) * width), text) for value, text in labels]
+    gap = 0.5 * style.em
+
+    def are_apart(one: tuple[int, str], other: tuple[int, str]) -> bool:
+        return other[0] - one[0] >= 0.5 * (style.width(one[1]) + style.width(other[1])) + gap
+
+    shown = places[:1]
+    for place in places[1:-1]:
+        if are_apart(shown[-1], place) and are_apart(place, places[-1]):
+            shown.append(place)
+    return [*shown, places[-1]]
+
+
+def _swatch_panel(named: list[Swatch], rows: int, style: Style) -> Panel:
+    """A patch of colour and a name on each line, down to ``rows`` and then in the next column."""
     edge, pad = round(_SWATCH * style.em), style.pad
     gap = round(0.6 * style.em)
-    widest = max(style.width(swatch.name) for swatch in named)
-    panel = Panel(style, style.line * len(named) + 2 * pad, edge + gap + widest + 2 * pad)
-    for number, swatch in enumerate(named):
-        top = pad + number * style.line
-        panel.fill(np.tile(255.0 * swatch.colour, (edge, edge, 1)), pad, top + round(0.25 * style.em))
-        panel.write(swatch.name, pad + edge + gap, top)
+    shown = named if len(named) <= _COLUMNS * rows else named[: _COLUMNS * rows - 1]
+    names = [swatch.name if len(swatch.name) <= _LETTERS else swatch.name[:_LETTERS] + "..." for swatch in shown]
+    texts = names if len(shown) == len(named) else [*names, f"and {len(named) - len(shown)} more"]
+    columns = [texts[first : first + rows] for first in range(0, len(texts), rows)]
+    widths = [edge + gap + max(style.width(text) for text in column) for column in columns]
+    starts = [pad + sum(widths[:k]) + 2 * gap * k for k in range(len(columns))]
+    panel = Panel(style, style.line * len(columns[0]) + 2 * pad, starts[-1] + widths[-1] + pad)
+    for number, text in enumerate(texts):
+        left, top = starts[number // rows], pad + number % rows * style.line
+        if number < len(shown):
+            panel.fill(np.tile(255.0 * shown[number].colour, (edge, edge, 1)), left, top + round(0.25 * style.em))
+        panel.write(text, left + edge + gap, top)
     return panel

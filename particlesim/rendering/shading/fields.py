@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,11 +11,14 @@ import numpy as np
 from particlesim.scene import Scene
 from particlesim.trajectory.frames import Frame, Header
 
-# How many figures a scale has beside it.
-_FEWEST, _MOST = 3, 5
+# A scale is divided evenly into so many parts at the most, with figures between them and at its ends.
+_MOST_PARTS = 4
 
-# Distances between the figures of a scale, times a power of ten.
-_STEPS = (5.0, 2.5, 2.0, 1.0)
+# Round ends are multiples of these, times a power of ten.
+_STEPS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+
+# What lies beyond a scale that a movie settles, as a share of all its particles at all times.
+_BEYOND = 0.02
 
 
 class Field(NamedTuple):
@@ -32,85 +35,103 @@ class Field(NamedTuple):
         return (self.values(header, frame, members) - self.low) / (self.high - self.low)
 
 
-def field_of(kind: str, scene: Scene, header: Header, first: Frame) -> Field:
-    """The field of a colour such as by_speed; its scale is the scene's, or settled by the first frame."""
+def is_settled_by_frames(scene: Scene) -> bool:
+    """Whether a scale of the scene depends on how its particles fare."""
+    return any(group.colour in _CHANGING and group.colour_range is None for group in scene.particles)
+
+
+def field_of(kind: str, scene: Scene, header: Header, frames: Sequence[Frame]) -> Field:
+    """The field of a colour such as by_speed; its scale is the scene's, or settled by some frames."""
     name, unit, values, scale = _FIELDS[kind]
     ranges = (g.colour_range for g in scene.particles if g.colour == kind and g.colour_range)
-    low, high = next(ranges, None) or scale(scene, header, first)
-    if low == high:
-        # One value for all: in the middle of a scale that shows it.
-        low, high = low - (0.5 * abs(low) or 0.5), high + (0.5 * abs(high) or 0.5)
+    low, high = next(ranges, None) or scale(scene, header, frames)
     return Field(name, unit, float(low), float(high), values)
 
 
 def figures(low: float, high: float) -> list[tuple[float, str]]:
-    """Three to five round values on the scale from ``low`` to ``high``, and how they are written."""
-    largest = math.floor(math.log10(high - low)) + 1
-    steps = [number * 10.0**power for power in (largest, largest - 1, largest - 2) for number in _STEPS]
-    step = next(step for step in steps if _FEWEST <= _count(low, high, step) <= _MOST)
-    first = math.ceil(low / step - 1e-9)
-    values = [step * (first + k) for k in range(_count(low, high, step))]
+    """Values that divide the scale from ``low`` to ``high`` evenly, its ends included, and how they are written.
+
+    There are as many as have the fewest figures.
+    """
+    parts = min(range(_MOST_PARTS, 1, -1), key=lambda parts: _count_figures((high - low) / parts))
+    values = np.linspace(low, high, parts + 1).tolist()
     if not 1e-3 <= max(abs(low), abs(high)) < 1e6:
         return [(value, f"{value:.3g}") for value in values]
-    places = max(0, -math.floor(math.log10(step) + 1e-9))
-    if abs(round(step, places) - step) > 1e-9 * step:
-        places += 1
-    return [(value, f"{value + 0.0:.{places}f}") for value in values]
+    # As many places as tell them exactly, or else to a thousandth of the scale.
+    most = max(0, 3 - math.floor(math.log10(high - low)))
+    exact = 1e-6 * (high - low)
+    fitting = (p for p in range(most) if all(abs(round(value, p) - value) <= exact for value in values))
+    places = next(fitting, most)
+    return [(value, f"{round(value, places) + 0.0:.{places}f}") for value in values]
 
 
-def _count(low: float, high: float, step: float) -> int:
-    """How many multiples of ``step`` there are from ``low`` to ``high``."""
-    return math.floor(high / step + 1e-9) - math.ceil(low / step - 1e-9) + 1
+def _count_figures(step: float) -> int:
+    """How many figures a number has, not counting noughts at both ends; as many as nine."""
+    return len(f"{step:.8e}".split("e")[0].replace(".", "").rstrip("0"))
+
+
+def _rounded(low: float, high: float) -> tuple[float, float]:
+    """The nearest round ends of a scale that has ``low`` and ``high`` on it: multiples of a quarter of it or more."""
+    if low == high:
+        # One value for all: in the middle of a scale that shows it.
+        low, high = low - (0.5 * abs(low) or 0.5), high + (0.5 * abs(high) or 0.5)
+    power = 10.0 ** math.floor(math.log10((high - low) / _MOST_PARTS))
+    steps = [number * power * ten for ten in (1.0, 10.0) for number in _STEPS]
+    ends = [(math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9), step) for step in steps]
+    first, last, step = min((end for end in ends if end[1] - end[0] <= _MOST_PARTS), key=lambda e: (e[1] - e[0]) * e[2])
+    return first * step, last * step
+
+
+def _reached(
+    values: Callable[[Header, Frame, np.ndarray], np.ndarray], header: Header, frames: Sequence[Frame]
+) -> float:
+    """What no more than the share _BEYOND of the particles at all times goes beyond; 0 if there are none."""
+    everyone = np.arange(len(header.size))
+    of_all = np.concatenate([values(header, frame, everyone) for frame in frames])
+    return float(np.quantile(of_all, 1.0 - _BEYOND)) if len(of_all) else 0.0
 
 
 def _speeds(header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
     return np.linalg.norm(frame.velocity[members], axis=1)
 
 
-def _speed_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, float]:
-    """From rest to twice the first r.m.s. speed, and what a fall through the world adds to it [m/s]."""
-    mean_square = float(np.mean(np.sum(first.velocity**2, axis=1))) if len(first.velocity) else 0.0
-    fall = float(np.abs(scene.world.gravity) @ np.asarray(scene.world.size))
-    return 0.0, float(np.sqrt(4.0 * mean_square + 2.0 * fall)) or 1.0
+def _speed_scale(scene: Scene, header: Header, frames: Sequence[Frame]) -> tuple[float, float]:
+    """From rest to what few ever go beyond [m/s]."""
+    return _rounded(0.0, _reached(_speeds, header, frames) or 1.0)
 
 
 def _heights(header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
     return frame.position[members, 2]
 
 
-def _height_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, float]:
-    """From the bottom of the world to its top, or from the lowest particle to the highest if it has neither [m]."""
-    if scene.world.boundary[2] != "open" or not len(first.position):
+def _height_scale(scene: Scene, header: Header, frames: Sequence[Frame]) -> tuple[float, float]:
+    """From the bottom of the world to its top, or as far as all but a few ever are if it has neither [m]."""
+    if scene.world.boundary[2] != "open" or not len(header.size):
         return -0.5 * scene.world.size[2], 0.5 * scene.world.size[2]
-    return float(first.position[:, 2].min()), float(first.position[:, 2].max())
+    heights = np.concatenate([frame.position[:, 2] for frame in frames])
+    low, high = np.quantile(heights, (0.5 * _BEYOND, 1.0 - 0.5 * _BEYOND))
+    return _rounded(float(low), float(high))
 
 
 def _sizes(header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
     return header.size[members]
 
 
-def _size_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, float]:
-    return (float(header.size.min()), float(header.size.max())) if len(header.size) else (0.0, 1.0)
+def _size_scale(scene: Scene, header: Header, frames: Sequence[Frame]) -> tuple[float, float]:
+    return _rounded(float(header.size.min()), float(header.size.max())) if len(header.size) else (0.0, 1.0)
 
 
 def _impacts(header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
     return frame.impacts[members]
 
 
-def _impact_scale(scene: Scene, header: Header, first: Frame) -> tuple[float, float]:
-    """From none to twice as many as a bounding sphere of a gas at the first speeds has had when the movie ends.
+def _impact_scale(scene: Scene, header: Header, frames: Sequence[Frame]) -> tuple[float, float]:
+    """From none to what few have had by then."""
+    return _rounded(0.0, max(1.0, _reached(_impacts, header, frames[-1:])))
 
-    It collides with others at a rate of sqrt(2) pi d^2 n v, and with walls of area A around a volume V at A v / 4 V
-    (J. Jeans, An Introduction to the Kinetic Theory of Gases, 1940, ch. 2 and 5).
-    """
-    edges = np.asarray(scene.world.size)
-    volume = float(edges.prod())
-    speed = float(np.linalg.norm(first.velocity, axis=1).mean()) if len(first.velocity) else 0.0
-    cross_section = math.pi * float(np.mean(4.0 * header.radius**2)) if len(header.size) else 0.0
-    walls = np.array(scene.world.boundary) == "wall"
-    rate = math.sqrt(2.0) * cross_section * len(header.size) / volume + 0.5 * float((walls / edges).sum())
-    return 0.0, max(1.0, round(2.0 * rate * speed * scene.duration))
 
+# Colours whose scales are settled by frames.
+_CHANGING = "by_speed", "by_height", "by_impacts"
 
 # Name, unit, values and scale of each. Sizes are factors on shapes of 1 m, hence metres.
 _FIELDS = {
