@@ -7,7 +7,7 @@ import pytest
 
 import particlesim as ps
 from particlesim.geometry.shapes import sphere
-from particlesim.rendering.camera import FILL, Box, light_azimuth, subject_box, view_at
+from particlesim.rendering.camera import FILL, Box, Camera, Window, light_azimuth, subject_box
 from particlesim.scene import Scene
 from particlesim.trajectory.frames import Frame, Header
 from tests.worlds import quick_twin
@@ -36,6 +36,10 @@ def project(view, aspect, points):
     slope = np.tan(0.5 * view.field_of_view)
     away = -local[:, 2]
     return local[:, :2] / (away[:, None] * slope * np.array([aspect, 1.0])), away
+
+
+def view_at(scene, time, aspect, subject=None):
+    return Camera(scene, aspect, subject).view(time)
 
 
 def corners(size):
@@ -150,8 +154,8 @@ def frame(position, velocity=None):
     return Frame(0.0, position, None, velocity, None, None, None)
 
 
-def open_scene(camera="fixed", boundary="open", **settings):
-    world = {"size": (100.0, 100.0, 100.0), "boundary": boundary}
+def open_scene(camera="fixed", boundary="open", gravity=(0.0, 0.0, 0.0), **settings):
+    world = {"size": (100.0, 100.0, 100.0), "boundary": boundary, "gravity": gravity}
     return Scene(world=world, particles=SPHERES, camera=camera, duration=2.0, **settings)
 
 
@@ -159,10 +163,54 @@ def test_an_open_world_is_framed_by_where_its_particles_start_and_fly():
     start = frame([(10.0, 0.0, 0.0), (12.0, 3.0, 1.0)], [(0.0, 0.0, 2.0), (1e9, 0.0, 0.0)])
     box = subject_box(open_scene(), header([2.0, 1.0]), start)
     assert box.lower == pytest.approx([9.0, -1.0, -1.0])
-    # As far as the world goes, however fast something leaves it.
-    assert box.upper == pytest.approx([50.0, 3.5, 5.0])
+    # As far as 200 diameters go, however fast something leaves the world.
+    assert box.upper == pytest.approx([12.5 + 200.0 * 1.5, 3.5, 5.0])
     far = frame([(500.0, 0.0, 0.0)], [(1.0, 0.0, 0.0)])
-    assert subject_box(open_scene(), header([2.0]), far).upper == pytest.approx([501.0, 1.0, 1.0])
+    assert subject_box(open_scene(), header([2.0]), far).upper == pytest.approx([503.0, 1.0, 1.0])
+
+
+def test_what_falls_and_what_is_blown_apart_is_framed_all_along_but_for_a_few_that_stray():
+    falling = open_scene(gravity=(0.0, 0.0, -9.81))
+    start = frame([(0.0, 0.0, 45.0)])
+    # In 2 s it falls by 19.62 m.
+    assert subject_box(falling, header([2.0]), start).lower[2] == pytest.approx(45.0 - 19.62 - 1.0)
+    deep = subject_box(open_scene(gravity=(0.0, 0.0, -100.0)), header([2.0]), frame([(0.0, 0.0, -49.0)]))
+    assert deep.lower[2] == pytest.approx(-49.0 - 200.0 - 1.0)
+    rng = np.random.default_rng(4)
+    directions = rng.normal(size=(1000, 3))
+    directions *= 40.0 / np.linalg.norm(directions, axis=1)[:, None]
+    directions[:10] *= 100.0
+    box = subject_box(open_scene(), header(np.full(1000, 1.0)), frame(np.zeros((1000, 3)), directions))
+    assert (box.upper > 70.0).all() and (box.upper < 81.0).all() and (box.lower < -70.0).all()
+
+
+@pytest.mark.parametrize("elevation", [5.0, 15.0, 40.0])
+@pytest.mark.parametrize("size", [(10.0, 10.0, 0.2), (10.0, 3.0, 3.0), (1.0, 1.0, 4.0)])
+def test_margins_are_equal_in_the_picture(size, elevation):
+    place, _ = project(view_at(scene({"kind": "fixed", "elevation": elevation}, size), 0.0, 1.5), 1.5, corners(size))
+    assert place.max(axis=0) == pytest.approx(-place.min(axis=0), abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["fixed", "orbit"])
+@pytest.mark.parametrize(
+    "window", [((-0.4, -0.92), (0.92, 0.92)), ((-0.92, -0.92), (0.5, 0.3)), ((0.1, -0.2), (0.9, 0.9))]
+)
+def test_what_is_framed_stays_in_its_window_and_as_near_to_the_middle_as_it_can(kind, window):
+    window = Window(*np.array(window))
+    some = scene({"kind": kind, "elevation": 15.0})
+    camera, places = Camera(some, 1.5, None, window), []
+    for time in np.linspace(0.0, 60.0, 41):
+        place, away = project(camera.view(time), 1.5, corners(some.world.size))
+        assert (away > 0.0).all()
+        places.append(place)
+    low, high = np.min(places, axis=(0, 1)), np.max(places, axis=(0, 1))
+    assert (low >= window.lower - 2e-3).all() and (high <= window.upper + 2e-3).all()
+    room = (window.upper - window.lower) - (high - low)
+    assert room.min() < 0.05
+    for axis in range(2):
+        off = high[axis] + low[axis]
+        at_rim = min(low[axis] - window.lower[axis], window.upper[axis] - high[axis]) < 0.02
+        assert abs(off) < 0.02 or at_rim
 
 
 def test_walls_are_framed_and_open_axes_by_their_particles_unless_told_otherwise():

@@ -6,6 +6,7 @@ import pytest
 import particlesim as ps
 from particlesim.broad_phase import METHODS
 from particlesim.geometry import shapes
+from particlesim.rendering.camera import Camera
 from particlesim.rendering.hud.history import WINDOW, History
 from particlesim.rendering.hud.legend import swatches
 from particlesim.rendering.hud.overlay import Overlay, legend_places
@@ -43,10 +44,10 @@ def make_frame(count=1, time=0.0, velocity=(0.0, 0.0, 0.0), **known):
     )
 
 
-def make_scene(*groups, size=(1280, 720), world=None, **show):
+def make_scene(*groups, size=(1280, 720), world=None, camera="fixed", **show):
     groups = groups or ({"shape": "sphere", "count": 1},)
     world = {"size": (2.0, 3.0, 4.0), **(world or {})}
-    return Scene(world=world, particles=groups, show=show, movie={"resolution": size})
+    return Scene(world=world, particles=groups, show=show, movie={"resolution": size}, camera=camera)
 
 
 def rows_of(scene, frame, first, header=None):
@@ -131,7 +132,9 @@ def test_a_world_that_is_open_has_no_pressure_and_a_first_frame_not_yet():
     window = [ledger(time=0.0, **known), ledger(time=1.0, **known)]
     assert pressure(make_scene(world={"boundary": ("open", "periodic", "open")}), window) is None
     scene = make_scene(readout=["pressure"])
-    assert rows_of(scene, make_frame(**known), make_frame(**known)) == []
+    assert rows_of(scene, make_frame(**known), make_frame(**known)) == [("pressure", "-")]
+    open_scene = make_scene(world={"boundary": "open"}, readout=["pressure"])
+    assert rows_of(open_scene, make_frame(**known), make_frame(**known)) == []
     later = {**known, "wall_impulse": np.array([1.0, 1.0, 1.0, 1.0, 1.0, 53.0])}
     # 52 N s on 52 m^2 in 2 s.
     assert rows_of(scene, make_frame(time=2.0, **later), make_frame(**known)) == [("pressure", "0.5000 Pa")]
@@ -164,6 +167,27 @@ def test_readout_stays_in_the_picture_and_in_its_corner(size, dark):
         assert not changed[:, 320:].any() and not changed[200:].any()
         panel = image[changed.any(axis=1)][:, changed.any(axis=0)].reshape(-1, 3).astype(int).sum(axis=1)
         assert panel.max() - panel.min() > 300
+
+
+@pytest.mark.parametrize("size", [(320, 180), (640, 360), (1280, 720), (720, 1280)])
+@pytest.mark.parametrize("edges", [(6.0, 1.6, 1.6), (3.0, 3.0, 3.0), (8.0, 8.0, 0.3), (1.2, 1.2, 2.4)])
+@pytest.mark.parametrize("kind", ["fixed", "orbit"])
+def test_panels_cover_no_corner_of_the_world(size, edges, kind):
+    camera = {"kind": kind, "elevation": 12.0}
+    scene = make_scene(SPEED, size=size, world={"size": edges}, camera=camera, legend=True)
+    first = make_frame(impacts=1, potential=1.0)
+    covered = drawn(scene, first)[0]
+    assert 0.01 < covered.mean() < 0.3
+    look = look_of(scene, make_header(1), first)
+    half = 0.5 * np.array(edges)
+    corners = (2.0 * np.array(list(np.ndindex(2, 2, 2))) - 1.0) * half
+    for time in np.linspace(0.0, 60.0, 25):
+        view = Camera(scene, size[0] / size[1], look.subject, look.window).view(time)
+        seen = (corners - view.pose[:3, 3]) @ view.pose[:3, :3]
+        per = 0.5 * size[1] / np.tan(0.5 * view.field_of_view) / -seen[:, 2]
+        columns, rows = 0.5 * size[0] + per * seen[:, 0], 0.5 * size[1] - per * seen[:, 1]
+        assert ((columns > 0) & (columns < size[0]) & (rows > 0) & (rows < size[1])).all()
+        assert not covered[rows.astype(int), columns.astype(int)].any()
 
 
 def test_figures_of_the_readout_do_not_move():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,11 +11,21 @@ from particlesim.scene import Scene
 from particlesim.scene.camera import FixedCamera, LookAtCamera, OrbitCamera, PathCamera
 from particlesim.trajectory.frames import Frame, Header
 
-# The world fills at most this fraction of the picture's width and height.
+# What is framed fills at most this fraction of the picture's width and height.
 FILL = 0.92
 
 # At so many times, evenly spread, it is looked where particles would be.
 _GLANCES = 9
+
+# Of many particles this share on each side does not count: a few that fly off for good make the others no smaller.
+_STRAYS = 0.02
+
+# Nor are flights followed farther than this beyond their start [diameters of a usual particle], or the world if that is
+# larger: on a picture 720 pixels high particles would be smaller than three or four pixels.
+_FARTHEST = 200.0
+
+# Angles, evenly spread, from which an orbit looks at what it frames.
+_ANGLES = 360
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -62,23 +73,80 @@ def subject_box(scene: Scene, header: Header, first: Frame) -> Box:
     return Box(np.where(by_particles, reach.lower, world.lower), np.where(by_particles, reach.upper, world.upper))
 
 
-def view_at(scene: Scene, time: float, aspect: float, subject: Box | None = None) -> View:
-    """The scene's camera at ``time`` [s], for a picture of ``aspect`` = width / height.
-
-    ``subject`` is what is framed where the scene leaves the distance open, the world if not given.
-    """
+def frames_freely(scene: Scene) -> bool:
+    """Whether the scene leaves open where its camera stands and what is in the middle of the picture."""
     camera = scene.camera
-    box = subject or world_box(scene)
-    if isinstance(camera, PathCamera):
-        position, target, field = _on_path(camera, time)
-        return View(_looking(position, target), field, _near(position, scene, box))
-    field = float(np.radians(camera.field_of_view))
-    if isinstance(camera, LookAtCamera):
-        pose = _looking(np.asarray(camera.position), np.asarray(camera.target))
-    else:
-        slope = FILL * np.tan(0.5 * field) * np.array([aspect, 1.0]) * camera.zoom
-        pose = _fixed(camera, box, slope) if isinstance(camera, FixedCamera) else _orbit(camera, time, box, slope)
-    return View(pose, field, _near(pose[:3, 3], scene, box))
+    free = isinstance(camera, FixedCamera | OrbitCamera) and camera.distance is None
+    return free and getattr(camera, "target", None) is None
+
+
+class Window(NamedTuple):
+    """The part of a picture in which a camera places what it frames: -1 .. 1 to the right, and up, (2,) each."""
+
+    lower: np.ndarray
+    upper: np.ndarray
+
+
+# All of the picture but a margin.
+WHOLE = Window(np.array([-FILL, -FILL]), np.array([FILL, FILL]))
+
+
+class Camera:
+    """The camera of a scene.
+
+    Parameters
+    ----------
+    scene
+        Whose camera it is.
+    aspect
+        Width of the picture over its height.
+    subject
+        What it frames where the scene leaves the distance open, the world if not given.
+    window
+        Where in the picture that is placed.
+    """
+
+    def __init__(self, scene: Scene, aspect: float, subject: Box | None = None, window: Window = WHOLE) -> None:
+        self._scene, self._box = scene, subject or world_box(scene)
+        camera = scene.camera
+        if isinstance(camera, FixedCamera | OrbitCamera):
+            target = getattr(camera, "target", None)
+            self._target = self._box.middle if target is None else np.asarray(target)
+            self._stand = np.array([0.0, 0.0, camera.distance or 0.0])
+            if frames_freely(scene):
+                self._stand = _stand(self._points(camera), *_tangents(camera, aspect, window))
+            elif camera.distance is None:
+                self._stand[2] = _distance_ahead(self._points(camera), _tangents(camera, aspect, WHOLE)[1])
+
+    def in_the_largest(self, aspect: float, windows: Sequence[Window]) -> Window:
+        """The window in which what it frames is seen from nearest, the first of them that are as good."""
+        camera = self._scene.camera
+        assert isinstance(camera, FixedCamera | OrbitCamera)
+        points = self._points(camera)
+        distances = [_least_distance(points, *_tangents(camera, aspect, window))[0] for window in windows]
+        return windows[int(np.argmin(np.array(distances) > min(distances) * (1.0 + 1e-9)))]
+
+    def view(self, time: float) -> View:
+        """Where it is at ``time`` [s]."""
+        camera = self._scene.camera
+        if isinstance(camera, PathCamera):
+            position, target, field = _on_path(camera, time)
+            return View(_looking(position, target), field, _near(position, self._scene, self._box))
+        if isinstance(camera, LookAtCamera):
+            pose = _looking(np.asarray(camera.position), np.asarray(camera.target))
+        else:
+            turned = 360.0 * time / camera.period if isinstance(camera, OrbitCamera) else 0.0
+            axes = _axes(camera.azimuth + turned, camera.elevation)
+            pose = _pose(axes, self._target + axes @ self._stand)
+        field = float(np.radians(camera.field_of_view))
+        return View(pose, field, _near(pose[:3, 3], self._scene, self._box))
+
+    def _points(self, camera: FixedCamera | OrbitCamera) -> np.ndarray:
+        """All places that it is to show, about its target and in its own axes, (n, 3)."""
+        corners = self._box.corners - self._target
+        if isinstance(camera, FixedCamera):
+            return corners @ _axes(camera.azimuth, camera.elevation)
+        return np.concatenate([corners @ _axes(360.0 * k / _ANGLES, camera.elevation) for k in range(_ANGLES)])
 
 
 def light_azimuth(scene: Scene) -> float:
@@ -92,42 +160,25 @@ def light_azimuth(scene: Scene) -> float:
 
 
 def _reach(scene: Scene, header: Header, first: Frame, world: Box) -> Box:
-    """Where particles are at first, and where they would fly freely in the scene's duration as far as the world goes.
-
-    A few that fly off for good do not make all others small.
-    """
+    """Where particles are at first, and where they would fly freely in the scene's duration."""
     radius = header.radius
-    lower, upper = _extent(first.position, radius)
+    start = _extent(first.position, radius, 0)
+    strays, far = int(_STRAYS * len(radius)), 2.0 * _FARTHEST * float(np.median(radius))
+    lowest, highest = np.minimum(world.lower, start.lower - far), np.maximum(world.upper, start.upper + far)
+    lower, upper = start
     gravity = np.asarray(scene.world.gravity)
     for time in np.linspace(0.0, scene.duration, _GLANCES)[1:]:
-        low, high = _extent(first.position + time * first.velocity + 0.5 * time**2 * gravity, radius)
-        lower = np.minimum(lower, np.maximum(low, world.lower))
-        upper = np.maximum(upper, np.minimum(high, world.upper))
+        there = _extent(first.position + time * first.velocity + 0.5 * time**2 * gravity, radius, strays)
+        lower = np.minimum(lower, np.maximum(there.lower, lowest))
+        upper = np.maximum(upper, np.minimum(there.upper, highest))
     return Box(lower, upper)
 
 
-def _extent(position: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (3,) of the box round balls."""
-    return (position - radius[:, None]).min(axis=0), (position + radius[:, None]).max(axis=0)
-
-
-def _fixed(camera: FixedCamera, box: Box, slope: np.ndarray) -> np.ndarray:
-    axes = _axes(camera.azimuth, camera.elevation)
-    if camera.distance is not None:
-        return _pose(axes, box.middle + camera.distance * axes[:, 2])
-    return _fitted(axes, box.corners, slope)
-
-
-def _orbit(camera: OrbitCamera, time: float, box: Box, slope: np.ndarray) -> np.ndarray:
-    axes = _axes(camera.azimuth + 360.0 * time / camera.period, camera.elevation)
-    target = box.middle if camera.target is None else np.asarray(camera.target)
-    if camera.distance is not None:
-        return _pose(axes, target + camera.distance * axes[:, 2])
-    rising, falling = _bounds_all_round(box.corners - target, camera.elevation, slope)
-    if camera.target is None:
-        # Above or below its middle, so that the margins are equal.
-        return _pose(axes, target + axes @ _stand(rising, falling, slope))
-    return _pose(axes, target + max(*rising, *falling) * axes[:, 2])
+def _extent(position: np.ndarray, radius: np.ndarray, strays: int) -> Box:
+    """The box round balls but for so many ``strays`` on each side."""
+    low, high = position - radius[:, None], position + radius[:, None]
+    last = len(radius) - 1 - strays
+    return Box(np.partition(low, strays, axis=0)[strays], np.partition(high, last, axis=0)[last])
 
 
 def _on_path(camera: PathCamera, time: float) -> tuple[np.ndarray, np.ndarray, float]:
@@ -178,36 +229,48 @@ def _looking(position: np.ndarray, target: np.ndarray) -> np.ndarray:
     return _pose(np.column_stack([right, np.cross(back, right), back]), position)
 
 
-def _fitted(axes: np.ndarray, points: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    """The pose nearest to the points that sees them all, with equal margins left and right, above and below."""
-    seen = points @ axes
-    rising = (seen[:, :2] / slope + seen[:, 2:]).max(axis=0)
-    falling = (-seen[:, :2] / slope + seen[:, 2:]).max(axis=0)
-    return _pose(axes, axes @ _stand(rising, falling, slope))
+def _tangents(camera: FixedCamera | OrbitCamera, aspect: float, window: Window) -> tuple[np.ndarray, np.ndarray]:
+    """The lower and the upper bounds of a window, enlarged as the camera zooms, at a distance of 1, (2,) each."""
+    half = np.tan(0.5 * np.radians(camera.field_of_view)) * np.array([aspect, 1.0])
+    middle, reach = 0.5 * (window.lower + window.upper), 0.5 * camera.zoom * (window.upper - window.lower)
+    return half * (middle - reach), half * (middle + reach)
 
 
-def _stand(rising: np.ndarray, falling: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    """Where a camera stands that sees all points and is nearest to them, in its own axes, (3,).
+def _stand(points: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Where a camera stands that sees all points within a window and is nearest to them, in its own axes, (3,).
 
-    A camera at (a, b, d) sees a point (x, y, z) when |x - a| <= slope_x (d - z), and likewise in y. The two sides of
-    each inequality bound d from below by lines in a that rise and fall, which start from the largest x / slope_x + z,
-    ``rising``, and -x / slope_x + z, ``falling``, (2,) each; they cross at the best a.
+    A camera at (a, b, d) sees a point (x, y, z) when lower (d - z) <= x - a <= upper (d - z), and likewise in y. So a
+    lies between the largest x + upper z, less upper d, and the least x + lower z, less lower d; they meet at the least
+    d. In the direction that has room to spare, the margins in the picture are the same on both sides if they can be.
     """
-    sideways = 0.5 * slope * (rising - falling)
-    return np.array([*sideways, float((0.5 * (rising + falling)).max())])
+    distance, most, least = _least_distance(points, lower, upper)
+    first, last = most - upper * distance, least - lower * distance
+    aside = [_in_the_middle(points[:, k], distance - points[:, 2]) for k in range(2)]
+    return np.array([*np.clip(aside, np.minimum(first, last), np.maximum(first, last)), distance])
 
 
-def _bounds_all_round(points: np.ndarray, elevation: float, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What ``_stand`` wants of points (n, 3) that turn about the upright axis through the origin.
+def _least_distance(points: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """The least d of ``_stand``, the largest x + upper z, and the least x + lower z, of both directions."""
+    most, least = (
+        (points[:, :2] + upper * points[:, 2:]).max(axis=0),
+        (points[:, :2] + lower * points[:, 2:]).min(axis=0),
+    )
+    return float(((most - least) / (upper - lower)).max()), most, least
 
-    The largest value of a sine and a cosine of one angle, added up, is the root of the sum of their squares.
-    """
-    radius, height = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
-    s, c = np.sin(np.radians(elevation)), np.cos(np.radians(elevation))
-    across = (radius * np.hypot(1.0 / slope[0], c) + height * s).max()
-    up = (radius * abs(c - s / slope[1]) + height * (s + c / slope[1])).max()
-    down = (radius * abs(c + s / slope[1]) + height * (s - c / slope[1])).max()
-    return np.array([across, up]), np.array([across, down])
+
+def _distance_ahead(points: np.ndarray, reach: np.ndarray) -> float:
+    """The least distance that shows points up to ``reach`` (2,) aside of straight ahead, at a distance of 1."""
+    return float((np.abs(points[:, :2]) / reach + points[:, 2:]).max())
+
+
+def _in_the_middle(across: np.ndarray, away: np.ndarray) -> float:
+    """From where points (n,), so far ``away``, reach as far to one side in a picture as to the other."""
+    low, high = float(across.min()), float(across.max())
+    for _ in range(60):  # halvings, to rounding
+        middle = 0.5 * (low + high)
+        seen = (across - middle) / away
+        low, high = (middle, high) if seen.max() + seen.min() > 0.0 else (low, middle)
+    return 0.5 * (low + high)
 
 
 def _near(position: np.ndarray, scene: Scene, box: Box) -> float:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from particlesim.core.constants import DISSIPATION
-from particlesim.rendering.camera import Box, subject_box
+from particlesim.rendering.camera import WHOLE, Box, Window, subject_box
+from particlesim.rendering.hud.overlay import Overlay
 from particlesim.rendering.shading.colour import ParticleColours
 from particlesim.scene import Scene
 from particlesim.setup.build import contact_laws_of
@@ -25,6 +26,8 @@ class Look:
         What stays the same about the particles.
     subject
         The box that the camera frames [m].
+    window
+        Where in the picture it does: beside what lies over it.
     colours
         Colours of particles, with the scales of fields.
     start
@@ -36,6 +39,7 @@ class Look:
     scene: Scene
     header: Header
     subject: Box
+    window: Window
     colours: ParticleColours
     start: Ledger | None
     causes: tuple[str, ...]
@@ -46,14 +50,16 @@ def look_of(scene: Scene, header: Header, first: Frame, frames: Sequence[Frame] 
 
     ``frames``: what scales are settled by where the scene leaves them open, in the order of time; ``first`` if none.
     """
-    return Look(
+    look = Look(
         scene=scene,
         header=header,
         subject=subject_box(scene, header, first),
         colours=ParticleColours(scene, header, frames or (first,)),
         start=first.ledger,
         causes=_causes(scene),
+        window=WHOLE,
     )
+    return replace(look, window=Overlay(look, dark=False).window(first))
 
 
 def _causes(scene: Scene) -> tuple[str, ...]:

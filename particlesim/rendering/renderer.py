@@ -6,7 +6,7 @@ from types import TracebackType
 
 import numpy as np
 
-from particlesim.rendering.camera import View, view_at
+from particlesim.rendering.camera import Camera, View
 from particlesim.rendering.gl import platform
 from particlesim.rendering.hud.history import History
 from particlesim.rendering.hud.overlay import Overlay
@@ -46,6 +46,7 @@ class Renderer:
         self._size = scene.movie.size
         self._drawn_size = (quality.samples * self._size[0], quality.samples * self._size[1])
         self._environment = environment = Environment(scene)
+        self._camera = Camera(scene, self._size[0] / self._size[1], look.subject, look.window)
         self._overlay = Overlay(look, environment.dark)
         self._tables = tables = geometry_tables(look.header)
         usual = float(np.median(tables.radius)) if len(tables.radius) else 0.0
@@ -84,7 +85,7 @@ class Renderer:
         -------
         (height, width, 3) uint8, sRGB.
         """
-        view = view_at(self._look.scene, frame.time, self._size[0] / self._size[1], self._look.subject)
+        view = self._camera.view(frame.time)
         instances = instances_of(self._look.scene, self._look.header, frame, self._tables)
         clusters = occlusion_clusters(instances.position, instances.tables.radius)
         projection = self._projection(view)

@@ -90,7 +90,7 @@ def _scale_panel(field: Field, begin: float, style: Style) -> Panel:
 
 
 def _apart(labels: list[tuple[float, str]], field: Field, width: int, style: Style) -> list[tuple[int, str]]:
-    """Where the marks of values are on a bar [pixels], with the values: both ends, and those that do not run together."""
+    """Where marks are on a bar [pixels], with their values: both ends, and those that do not run together."""
     places = [(round((value - field.low) / (field.high - field.low) * width), text) for value, text in labels]
     gap = 0.5 * style.em
 

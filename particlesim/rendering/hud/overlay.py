@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import itertools
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+from particlesim.rendering.camera import WHOLE, Camera, Window, frames_freely
 from particlesim.rendering.hud.history import History
 from particlesim.rendering.hud.legend import legend_panels
 from particlesim.rendering.hud.panel import Panel, Style
 from particlesim.rendering.hud.readout import readout_panel, readout_rows
-from particlesim.rendering.look import Look
 from particlesim.trajectory.frames import Frame
+
+if TYPE_CHECKING:
+    from particlesim.rendering.look import Look
+
+# The readout takes this share of the picture's height at the most; rows that would go beyond are left out.
+_READOUT = 0.5
+
+# What is framed is placed beside panels where that leaves it this share of the picture's width and height.
+_LEAST = 0.3
 
 
 class Overlay:
@@ -22,15 +34,43 @@ class Overlay:
 
     def draw(self, image: np.ndarray, frame: Frame, history: History) -> None:
         """Lay the panels for ``frame`` over ``image`` (h, w, 3) uint8."""
-        margin = self._style.margin
-        rows = readout_rows(self._look, frame, history)
-        taken = (0, 0)
-        if rows:
-            panel = readout_panel(rows, self._style)
-            panel.lay(image, margin, margin)
-            taken = margin + panel.size[0], margin + panel.size[1]
-        for legend, left, top in legend_places(self._legends, self._look.scene.movie.size, taken, margin):
-            legend.lay(image, left, top)
+        for panel, left, top in self._places(frame, history):
+            panel.lay(image, left, top)
+
+    def window(self, first: Frame) -> Window:
+        """Where a camera that frames by itself places what it shows: beside or below the panels for ``first``."""
+        scene, margin = self._look.scene, self._style.margin
+        places = self._places(first, History())
+        if not places or not frames_freely(scene):
+            return WHOLE
+        size = np.array(scene.movie.size)
+        windows = []
+        for choice in itertools.product((0, 1), repeat=len(places)):
+            lower, upper = WHOLE.lower.copy(), WHOLE.upper.copy()
+            for (panel, left, top), axis in zip(places, choice, strict=True):
+                # In pixels from the lower left corner of the picture.
+                tall, wide = panel.size
+                low, high = (left - margin, size[1] - top - tall - margin)[axis], (left + wide, size[1] - top)[axis]
+                if low + high < size[axis]:
+                    lower[axis] = max(lower[axis], 2.0 * (high + margin) / size[axis] - 1.0)
+                else:
+                    upper[axis] = min(upper[axis], 2.0 * low / size[axis] - 1.0)
+            if (upper - lower >= 2.0 * _LEAST).all():
+                windows.append(Window(lower, upper))
+        aspect = size[0] / size[1]
+        return Camera(scene, aspect, self._look.subject).in_the_largest(aspect, windows) if windows else WHOLE
+
+    def _places(self, frame: Frame, history: History) -> list[tuple[Panel, int, int]]:
+        """The panels for a frame with their left and top [pixels]."""
+        style, size = self._style, self._look.scene.movie.size
+        most = max(1, int((_READOUT * size[1] - style.margin - 2 * style.pad) / style.line))
+        rows = readout_rows(self._look, frame, history)[:most]
+        if not rows:
+            return legend_places(self._legends, size, (0, 0), style.margin)
+        panel = readout_panel(rows, style)
+        taken = style.margin + panel.size[0], style.margin + panel.size[1]
+        legends = legend_places(self._legends, size, taken, style.margin)
+        return [(panel, style.margin, style.margin), *legends]
 
 
 def legend_places(

@@ -13,9 +13,10 @@ _DARK = np.array([[22.0, 25.0, 29.0], [245.0, 245.0, 242.0], [176.0, 180.0, 184.
 _LIGHT = np.array([[252.0, 252.0, 250.0], [24.0, 27.0, 31.0], [96.0, 100.0, 104.0]], dtype=np.float32)
 _OPACITY = 0.88
 
-# Height of letters as a fraction of the picture's shorter side, and the least [pixels]: below that they run together.
-_TEXT = 0.026
-_SMALLEST = 12.0
+# Height of letters as a fraction of the picture's shorter side, and the least [pixels]; in a small picture they are
+# smaller, up to a larger fraction of it, but not so small that they run together.
+_TEXT, _LARGEST_TEXT = 0.026, 0.05
+_SMALL, _SMALLEST = 12.0, 8.0
 
 # Texts whose ink is kept: names stay from picture to picture, and so do most values.
 _REMEMBERED = 256
@@ -25,7 +26,9 @@ class Style:
     """Letters and colours of the panels of one movie, for pictures of ``size`` (width, height), ``dark`` or light."""
 
     def __init__(self, size: tuple[int, int], dark: bool) -> None:
-        self.em = max(_SMALLEST, _TEXT * min(size))  # height of the letters [pixels]
+        side = min(size)
+        least = max(_SMALLEST, min(_SMALL, _LARGEST_TEXT * side))
+        self.em = max(least, _TEXT * side)  # height of the letters [pixels]
         self.plate, self.strong, self.faint = _DARK if dark else _LIGHT
         self._font = ImageFont.load_default(size=self.em)
         self._glyph = functools.cache(self._draw_glyph)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,10 +12,12 @@ from particlesim.broad_phase import METHODS
 from particlesim.core.constants import DISSIPATION
 from particlesim.rendering.hud.history import History
 from particlesim.rendering.hud.panel import Panel, Style
-from particlesim.rendering.look import Look
 from particlesim.scene import Scene
 from particlesim.trajectory.frame_aabb import frame_boxes
 from particlesim.trajectory.frames import Frame, Ledger
+
+if TYPE_CHECKING:
+    from particlesim.rendering.look import Look
 
 # Methods as the readout calls them and as the library does.
 _METHODS = {"naive": "naive", "boxing": "grid", "octree": "octree"}
@@ -62,9 +64,12 @@ def _temperature(look: Look, frame: Frame, history: History) -> Iterator[Row]:
 
 
 def _pressure(look: Look, frame: Frame, history: History) -> Iterator[Row]:
-    window = history.up_to(frame.ledger) if frame.ledger else ()
-    if len(window) > 1 and (found := pressure(look.scene, window)) is not None:
-        yield Row("pressure", f"{_figure(found)} Pa", "0.000e+00 Pa")
+    if frame.ledger is None or not _has_pressure(look.scene):
+        return
+    window = history.up_to(frame.ledger)
+    found = pressure(look.scene, window) if len(window) > 1 else None
+    # In the first frame there is none yet, but its line: nothing jumps when there is.
+    yield Row("pressure", "-" if found is None else f"{_figure(found)} Pa", "0.000e+00 Pa")
 
 
 def _speed(look: Look, frame: Frame, history: History) -> Iterator[Row]:
@@ -146,6 +151,12 @@ def energy_change(now: Ledger, start: Ledger) -> float:
 def _all_energy(ledger: Ledger) -> float:
     """Kinetic energy and depth of the potential [J]."""
     return ledger.kinetic + abs(ledger.potential)
+
+
+def _has_pressure(scene: Scene) -> bool:
+    """Whether there are walls, or a period all round."""
+    boundary = np.array(scene.world.boundary)
+    return bool((boundary == "wall").any() or (boundary == "periodic").all())
 
 
 def pressure(scene: Scene, window: Sequence[Ledger]) -> float | None:

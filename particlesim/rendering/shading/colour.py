@@ -28,7 +28,7 @@ _FIELD_MAP = (
 )  # fmt: skip
 
 
-# Colours of the map have at least this contrast with a dark background, as WCAG 2.2 defines it: (L + 0.05) / (L' + 0.05).
+# Colours of the map have at least this contrast with a dark background: (L + 0.05) / (L' + 0.05), as in WCAG 2.2.
 _CONTRAST, _FLARE = 2.5, 0.05
 
 # More of the map than this is not left out for it.
