@@ -1,5 +1,7 @@
 """The readout and the legends: what they say, where they lie, and that they hold still."""
 
+import unicodedata
+
 import numpy as np
 import pytest
 
@@ -264,7 +266,7 @@ def test_swatches_name_groups_and_shapes_once_each():
         SPEED,
         {"shape": "sphere", "count": 0, "colour": "red"},
     ]
-    named = swatches(make_scene(*groups), make_header(5, np.arange(5)))
+    named = swatches(make_scene(*groups), make_header(5, np.arange(5)), Style((1280, 720), dark=True).can_write)
     assert [swatch.name for swatch in named] == ["sphere", "group 3", "e = 1"]
     assert named[1].colour == pytest.approx(encoded(PALETTE[2]))
     assert named[2].colour == pytest.approx([1.0, 0x80 / 255, 0.0])
@@ -296,6 +298,21 @@ def test_values_of_a_scale_are_in_the_middle_below_their_marks():
     for end in (mark.min(), mark.max()):
         near = inked[np.abs(inked - end) < 12]
         assert abs(0.5 * (near.min() + near.max()) - end) <= 1.5
+
+
+def test_letters_that_the_usual_font_lacks_come_from_others_or_the_group_goes_by_its_number():
+    style = Style((1280, 720), dark=True)
+    lacking = style.ink("\U0010ffff")
+    for name in ("Stöße", "Sto\u0308ße", "Δt = 3 µs", "шары", "\U0001f600", "\u2764\ufe0f"):
+        assert style.can_write(name)
+        letters = [letter for letter in unicodedata.normalize("NFC", name) if letter not in " \ufe0f"]
+        assert all(style.ink(letter).max() > 0.5 for letter in letters)
+        assert not any(np.array_equal(style.ink(letter), lacking) for letter in letters)
+    assert np.array_equal(style.ink("Sto\u0308ße"), style.ink("Stöße"))
+    # What no font has (a code point for private use) is not drawn as a box.
+    groups = [{"shape": "sphere", "count": 1, "colour": "red", "name": name} for name in ("ok", "no \U000ffffd")]
+    named = swatches(make_scene(*groups), make_header(2, np.arange(2)), style.can_write)
+    assert [swatch.name for swatch in named] == ["ok", "group 2"]
 
 
 def test_legends_that_do_not_fit_are_left_out():

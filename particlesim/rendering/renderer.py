@@ -97,7 +97,9 @@ class Renderer:
         ground = self._environment.ground(self._floor_light(instances))
         colours = shade(projection, buffer, instances, paint, lighting, ground)
         # The floor, which is seen from above only, hides no line: those on it would be dashes.
-        depth = 1.0 - np.float32(view.near) * np.maximum(buffer.inverse_depth, 0.0)
+        depth = np.maximum(buffer.inverse_depth, 0.0)
+        depth *= np.float32(-view.near)
+        depth += np.float32(1.0)
         drawn = self._canvas.draw(self._bridge.Picture(self._view_block(view), colours, depth))
         # OpenGL's first row is the lowest, and it has a fourth channel.
         image = fxaa(drawn) if self._quality.fxaa else np.ascontiguousarray(drawn[::-1, :, :3])

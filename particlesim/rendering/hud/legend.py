@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -41,20 +42,23 @@ def legend_panels(scene: Scene, header: Header, colours: ParticleColours, style:
     if scene.show.legend is False:
         return []
     panels = [_scale_panel(field, colours.begin, style) for field in colours.fields]
-    named = swatches(scene, header) if scene.show.legend else []
+    named = swatches(scene, header, style.can_write) if scene.show.legend else []
     rows = max(1, int(_NAMES * scene.movie.size[1] / style.line))
     return [*panels, _swatch_panel(named, rows, style)] if named else panels
 
 
-def swatches(scene: Scene, header: Header) -> list[Swatch]:
-    """The colours that do not stand for a field, in the order of groups: of shapes by their name, else of groups."""
+def swatches(scene: Scene, header: Header, can_write: Callable[[str], bool]) -> list[Swatch]:
+    """The colours that do not stand for a field, in the order of groups: of shapes by their name, else of groups.
+
+    A group whose name cannot be written, as no font has its letters, goes by its number as one without a name does.
+    """
     found: list[Swatch] = []
     of_shapes = np.sqrt(shape_colours(header))
     for number, group in enumerate(scene.particles):
         members = np.flatnonzero(header.group == number)
         if not len(members) or group.colour in FIELDS:
             continue
-        name = group.name or f"group {number + 1}"
+        name = group.name if group.name and can_write(group.name) else f"group {number + 1}"
         if group.colour == "by_shape":
             shape = int(header.shape[members[0]])
             found.append(Swatch(of_shapes[shape], header.shapes[shape].name))

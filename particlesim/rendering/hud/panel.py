@@ -5,7 +5,9 @@ from __future__ import annotations
 import functools
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
+
+from particlesim.rendering.hud.fonts import Fonts, letters_of
 
 # Plate, strong text and faint text in sRGB, for pictures with a dark background and with a light one. The plate lets a
 # little of the picture through.
@@ -30,7 +32,7 @@ class Style:
         least = max(_SMALLEST, min(_SMALL, _LARGEST_TEXT * side))
         self.em = max(least, _TEXT * side)  # height of the letters [pixels]
         self.plate, self.strong, self.faint = _DARK if dark else _LIGHT
-        self._font = ImageFont.load_default(size=self.em)
+        self._fonts = Fonts(self.em)
         self._glyph = functools.cache(self._draw_glyph)
         self.ink = functools.lru_cache(_REMEMBERED)(self._draw_text)
 
@@ -51,11 +53,15 @@ class Style:
 
     def width(self, text: str) -> int:
         """How wide text is [pixels]."""
-        return sum(self._glyph(letter)[1] for letter in text)
+        return sum(self._glyph(letter)[1] for letter in letters_of(text))
+
+    def can_write(self, text: str) -> bool:
+        """Whether there are fonts for all letters of a text."""
+        return all(self._fonts.of(letter) for letter in letters_of(text))
 
     def _draw_text(self, text: str) -> np.ndarray:
         """How much ink text leaves, (h, w) float32 0 .. 1."""
-        glyphs = [self._glyph(letter) for letter in text]
+        glyphs = [self._glyph(letter) for letter in letters_of(text)]
         tall, wide = (max((mask.shape[axis] for mask, _ in glyphs), default=0) for axis in (0, 1))
         ink, left = np.zeros((tall, self.width(text) + wide), dtype=np.float32), 0
         for mask, advance in glyphs:
@@ -67,9 +73,12 @@ class Style:
     def _draw_glyph(self, letter: str) -> tuple[np.ndarray, int]:
         """How much ink a letter leaves, (h, w) float32 0 .. 1, and how far the next one stands [pixels]."""
         # Whole pixels, and one width for all figures: a number changes in place, nothing else moves.
-        advance = round(self._font.getlength("0" if letter.isdigit() else letter))
+        usual = self._fonts.usual
+        font = self._fonts.of(letter) or usual
+        advance = round(font.getlength("0" if letter.isdecimal() else letter))
         tile = Image.new("L", (advance + round(0.3 * self.em), round(1.4 * self.em)))
-        ImageDraw.Draw(tile).text((0, 0), letter, fill=255, font=self._font)
+        # All fonts stand on the line of the usual one.
+        ImageDraw.Draw(tile).text((0, usual.getmetrics()[0]), letter, fill=255, font=font, anchor="ls")
         return np.asarray(tile, dtype=np.float32) / 255.0, advance
 
 
