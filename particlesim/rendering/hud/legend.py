@@ -115,6 +115,7 @@ def _swatch_panel(named: list[Swatch], rows: int, style: Style) -> Panel:
     shown = named if len(named) <= _COLUMNS * rows else named[: _COLUMNS * rows - 1]
     names = [swatch.name if len(swatch.name) <= _LETTERS else swatch.name[:_LETTERS] + "..." for swatch in shown]
     texts = names if len(shown) == len(named) else [*names, f"and {len(named) - len(shown)} more"]
+    rows = -(-len(texts) // -(-len(texts) // rows))  # as many in each column
     columns = [texts[first : first + rows] for first in range(0, len(texts), rows)]
     widths = [edge + gap + max(style.width(text) for text in column) for column in columns]
     starts = [pad + sum(widths[:k]) + 2 * gap * k for k in range(len(columns))]
