@@ -17,7 +17,7 @@ ROWS = ["time", "particles", "impacts", "energy change", "temperature", "pressur
 
 def tasks():
     """The look of a short movie with every kind of readout, field and line, and its frames with their histories."""
-    movie = {"fps": 20.0, "resolution": [160, 120]}
+    movie = {"fps": 20.0, "resolution": [480, 360]}
     show = {"readout": ROWS, "cells": True, "legend": True}
     scene = gas(12, gravity=(0, 0, -9.81), boundary=("wall", "periodic", "wall"), duration=0.45, movie=movie, show=show)
     for group, colour in zip(scene.particles, ("by_speed", "by_height", "by_impacts", "by_shape"), strict=True):
