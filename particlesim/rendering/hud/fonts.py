@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import unicodedata
+from typing import cast
 
 from PIL import ImageFont
 
@@ -15,7 +16,8 @@ class Fonts:
     """Fonts with letters ``em`` pixels high; ``usual``: the one of all texts, as far as it goes."""
 
     def __init__(self, em: float) -> None:
-        self.usual = ImageFont.load_default(size=em)
+        # With a size it is one that can be scaled.
+        self.usual = cast("ImageFont.FreeTypeFont", ImageFont.load_default(size=em))
         self._em = em
         self.of = functools.cache(self._find)
 
