@@ -4,6 +4,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from numba import typeof
 
 import particlesim as ps
 from particlesim.simulation.simulation import Simulation
@@ -54,6 +55,20 @@ def test_resting_bodies_rest_on(tmp_path):
     resumed = ps.Simulation.load(tmp_path / "run.ckpt")
     assert resumed.model.particles["resting"].any()
     assert len(resumed._solver.state.forces)
+
+
+def test_what_is_loaded_is_of_the_types_that_kernels_are_compiled_for(tmp_path):
+    sim = Simulation(heap())
+    sim.run(duration=0.8)
+    sim.save(tmp_path / "run.ckpt")
+    resumed = ps.Simulation.load(tmp_path / "run.ckpt")
+    for before, after in (
+        (sim.model.system._asdict(), resumed.model.system._asdict()),
+        (sim._solver.state.arrays(), resumed._solver.state.arrays()),
+    ):
+        for name, array in before.items():
+            if isinstance(array, np.ndarray):
+                assert typeof(array) == typeof(after[name]), name
 
 
 def test_the_hash_covers_what_the_next_step_depends_on():

@@ -19,6 +19,23 @@ def record(fields: Sequence[tuple[Any, ...]]) -> np.dtype:
     return np.dtype((np.record, np.dtype(list(fields), align=True)))
 
 
+def as_records(array: np.ndarray) -> np.ndarray:
+    """A view of an array as the records that ``record`` made, where a file kept their fields but not that it did.
+
+    To kernels another dtype is another type, which they would be compiled for again.
+    """
+    names, fields = array.dtype.names, array.dtype.fields
+    if names is None or fields is None:
+        return array
+    layout: Any = {
+        "names": names,
+        "formats": [fields[name][0] for name in names],
+        "offsets": [fields[name][1] for name in names],
+        "itemsize": array.dtype.itemsize,
+    }
+    return array.view(np.dtype((np.record, np.dtype(layout, align=True))))
+
+
 # Bytes of a cache line.
 _LINE = 64
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from particlesim.core.atomic_write import atomic_write
-from particlesim.core.records import cache_aligned
+from particlesim.core.records import as_records, cache_aligned
 from particlesim.dynamics.solver_state import Counts, SolverState
 from particlesim.geometry.shape_table import ShapeTable
 from particlesim.geometry.shapes import Shape
@@ -80,6 +80,7 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
 
 def _assembled(text: dict[str, Any], arrays: dict[str, np.ndarray]) -> Checkpoint:
     """The checkpoint of what was stored."""
+    arrays = {name: as_records(array) for name, array in arrays.items()}
     shapes = ShapeTable(**_under("shapes.", arrays))
     arrays["system.body"] = cache_aligned(arrays["system.body"])
     system = System(shapes, particles=text["particles"], bounded=text["bounded"], **_under("system.", arrays))
