@@ -10,6 +10,7 @@ from PIL import Image
 
 import particlesim as ps
 from particlesim.core.atomic_write import atomic_write
+from particlesim.jobs.partial_run import PartialRunError
 from particlesim.rendering import write_image
 from tests.worlds import gas
 
@@ -52,19 +53,17 @@ def test_any_legal_name_works(tmp_path, name):
     assert [p.name for p in tmp_path.iterdir()] == [name]
 
 
-def test_two_movies_of_one_name_are_one_whole_movie(tmp_path):
-    path = tmp_path / "movie.mp4"
-    assert both(lambda: ps.render(gas(3, **SMALL), path)) == []
-    assert len(list(iio.imiter(path, plugin="FFMPEG"))) == 11
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["movie.mp4", "movie.png"]
-
-
-def test_two_trajectories_of_one_name_are_one_whole_trajectory(tmp_path):
-    path = tmp_path / "run.gsd"
-    assert both(lambda: ps.simulate(gas(3, **SMALL), path)) == []
-    with ps.Trajectory(path) as trajectory:
-        assert len(list(trajectory)) == 11
-    assert [p.name for p in tmp_path.iterdir()] == ["run.gsd"]
+@pytest.mark.parametrize(("make", "files"), [(ps.render, ["run.mp4", "run.png"]), (ps.simulate, ["run.gsd"])])
+def test_of_two_runs_of_one_name_one_is_refused_and_the_other_whole(tmp_path, make, files):
+    path = tmp_path / files[0]
+    (refused,) = both(lambda: make(gas(3, **SMALL), path))
+    assert isinstance(refused, PartialRunError) and "another run is at work" in str(refused)
+    assert sorted(p.name for p in tmp_path.iterdir()) == files
+    if make is ps.render:
+        assert len(list(iio.imiter(path, plugin="FFMPEG"))) == 11
+    else:
+        with ps.Trajectory(path) as trajectory:
+            assert len(list(trajectory)) == 11
 
 
 def test_a_full_disk_names_the_file(tmp_path, monkeypatch):

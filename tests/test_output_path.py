@@ -22,7 +22,7 @@ def no_work(monkeypatch):
     def work(*_, **__):
         raise AssertionError("work was begun")
 
-    for name in ("movie.start", "movie.opened", "drawers.Renderer"):
+    for name in ("frame_source.start", "movie.opened", "drawers.Renderer"):
         monkeypatch.setattr(f"particlesim.jobs.{name}", work)
 
 

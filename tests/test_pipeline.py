@@ -72,14 +72,14 @@ def test_a_scale_is_settled_by_the_run_and_not_by_its_start(tmp_path):
     s = scene(ball, size=(6, 6, 6), boundary="open", gravity=(0, 0, -9.81), **SMALL)
     source = frame_source(s, None, None, None)
     calls = []
-    frames, sample = frames_ahead(source, source.frames, lambda *call: calls.append(call))
+    frames, sample = frames_ahead(source, source.frames, lambda *call: calls.append(call), 0)
     assert [number for number, _ in frames] == list(range(6)) and calls[-1] == ("simulating", 6, 6)
     (field,) = look_of(s, source.header, source.first, sample).colours.fields
     assert (field.low, field.high) == (0.0, 5.0)
     ps.simulate(s, tmp_path / "run.gsd")
     with Trajectory(tmp_path / "run.gsd") as stored:
         late = frame_source(stored, range(4, 6), None, None)
-        frames, sample = frames_ahead(late, late.frames, None)
+        frames, sample = frames_ahead(late, late.frames, None, 0)
         assert [number for number, _ in frames] == [4, 5]
         assert [frame.time for frame in sample] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
 

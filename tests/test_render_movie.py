@@ -1,14 +1,17 @@
 """Movies and images as files: what is in them, and that none is left half written."""
 
 import re
+import tempfile
+from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
 
-from particlesim.rendering import RenderError, write_image, write_movie
-from particlesim.rendering.video import encoder as movie
+from particlesim.core.atomic_write import atomic_write
+from particlesim.rendering import RenderError, write_image
+from particlesim.rendering.video import encoder, segments
 from particlesim.rendering.video.fade import faded, strength
 
 SIZE = (130, 98)  # even, but no multiples of the 16 pixels that encoders like
@@ -21,6 +24,19 @@ def images(count):
         yield image
 
 
+def write_movie(path, pictures, fps, size, crf=18):
+    """Make a movie of pictures, in a folder that does not stay."""
+    with (
+        atomic_write(path) as hidden,
+        tempfile.TemporaryDirectory(dir=hidden.parent) as folder,
+        segments.Segments(Path(folder), fps, size, crf) as movie,
+    ):
+        for picture in pictures:
+            movie.send(picture)
+        movie.join(hidden, {})
+    return movie
+
+
 def decoded(path):
     reader = imageio_ffmpeg.read_frames(str(path))
     meta = next(reader)
@@ -30,14 +46,14 @@ def decoded(path):
 
 def test_movie_has_the_frames_size_rate_and_colours_that_went_in(tmp_path):
     path = tmp_path / "a.mp4"
-    times = write_movie(path, images(25), 25.0, SIZE)
+    movie = write_movie(path, images(25), 25.0, SIZE)
     meta, frames = decoded(path)
     assert meta["size"] == SIZE and meta["codec"] == "h264" and meta["pix_fmt"].startswith("yuv420p")
     assert "bt709" in meta["pix_fmt"] and meta["fps"] == 25.0 and len(frames) == 25
     for got, sent in zip(frames, images(25), strict=True):
         assert np.abs(got.astype(int) - sent).mean() < 3.0
     assert np.abs(frames[0][30, 20].astype(int) - (180, 40, 30)).max() < 12
-    assert times.frames == 25 and times.drawing >= 0.0 and times.encoding > 0.0
+    assert movie.sent == 25 and movie.seconds > 0.0
     assert [p.name for p in tmp_path.iterdir()] == ["a.mp4"]
     # Faststart: the index stands before the data.
     data = path.read_bytes()
@@ -107,7 +123,7 @@ def test_failing_ffmpeg_says_why_in_one_line(tmp_path, monkeypatch):
     fake = tmp_path / "ffmpeg"
     fake.write_text("#!/bin/sh\necho first >&2\necho no space left on device >&2\nexit 3\n")
     fake.chmod(0o755)
-    monkeypatch.setattr(movie, "ffmpeg", lambda: str(fake))
+    monkeypatch.setattr(encoder, "ffmpeg", lambda: str(fake))
     with pytest.raises(RenderError) as error:
         write_movie(tmp_path / "a.mp4", images(200), 30.0, SIZE)
     assert str(error.value) == "ffmpeg failed with exit status 3: no space left on device"
@@ -118,7 +134,7 @@ def test_an_ffmpeg_that_is_killed_names_the_signal(tmp_path, monkeypatch):
     fake = tmp_path / "ffmpeg"
     fake.write_text("#!/bin/sh\nkill -9 $$\n")
     fake.chmod(0o755)
-    monkeypatch.setattr(movie, "ffmpeg", lambda: str(fake))
+    monkeypatch.setattr(encoder, "ffmpeg", lambda: str(fake))
     with pytest.raises(RenderError, match=r"^ffmpeg was ended by SIGKILL: no message$"):
         write_movie(tmp_path / "a.mp4", images(200), 30.0, SIZE)
 

@@ -25,8 +25,9 @@ def tasks():
     source = frame_source(scene, None, None, None)
     history, drawn = History().then(source.first.ledger), []
     for _, frame in source.frames:
-        drawn.append((frame, history))
-        history = history.then(frame.ledger)
+        if frame is not None:
+            drawn.append((frame, history))
+            history = history.then(frame.ledger)
     return look_of(scene, source.header, source.first), drawn
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import particlesim as ps
 from particlesim.scene.file import SceneError
 from particlesim.simulation.simulation import Simulation
 from particlesim.trajectory.frames import Ledger
@@ -80,11 +81,12 @@ def test_many_sizes_become_a_bounded_number_of_types(tmp_path):
 
 
 def test_a_file_appears_whole_or_not_at_all(tmp_path):
-    sim = Simulation(gas(2))
-    (tmp_path / "run.gsd").write_text("what was there before")
-    with pytest.raises(RuntimeError, match="half way"), TrajectoryWriter(tmp_path / "run.gsd", sim.header) as writer:
-        writer.append(sim.frame())
+    def stop(*_):
         raise RuntimeError("half way")
+
+    (tmp_path / "run.gsd").write_text("what was there before")
+    with pytest.raises(RuntimeError, match="half way"):
+        ps.simulate(gas(2), tmp_path / "run.gsd", progress=stop)
     assert (tmp_path / "run.gsd").read_text() == "what was there before"
     assert [path.name for path in tmp_path.iterdir()] == ["run.gsd"]
 

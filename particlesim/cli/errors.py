@@ -29,19 +29,25 @@ def one_line_errors(source: Path) -> Iterator[None]:
         try:
             yield
         except SceneError as error:
-            fail(str(error if error.file else error.within(source)), 2)
+            _fail_as(error, str(error if error.file else error.within(source)), 2)
         except BrokenPipeError:  # the reader of the output has closed it; typer ends the program
             raise
         except (RenderError, OSError) as error:
-            fail(_described(error), 1)
+            _fail_as(error, _described(error), 1)
         except (ValueError, RuntimeError) as error:
             # Errors of other modules of ours, which need not be imported to catch them.
             if not type(error).__module__.startswith("particlesim."):
                 raise
-            fail(str(error), 2 if isinstance(error, ValueError) else 1)
+            _fail_as(error, str(error), 2 if isinstance(error, ValueError) else 1)
     except KeyboardInterrupt as error:
         number = getattr(error, "number", signal.SIGINT)
-        fail(f"{_ENDED[number]}; nothing was written", 128 + number)
+        kept = "; ".join(getattr(error, "__notes__", ["nothing was written"]))
+        fail(f"{_ENDED[number]}; {kept}", 128 + number)
+
+
+def _fail_as(error: Exception, message: str, code: int) -> NoReturn:
+    """End the program with the line of an error, and with the notes on it of what was kept."""
+    fail("; ".join([message, *getattr(error, "__notes__", [])]), code)
 
 
 def _described(error: Exception) -> str:

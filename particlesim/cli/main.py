@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from particlesim.cli.bench import measure_drawing, measure_steps
+from particlesim.cli.clean import clean
 from particlesim.cli.errors import fail, one_line_errors
-from particlesim.cli.options import MaxDrift, Quiet, SceneArgument, Threads
+from particlesim.cli.options import MaxDrift, Quiet, Resume, SceneArgument, Threads
 from particlesim.cli.output import place_for
 from particlesim.cli.render import render
 from particlesim.cli.run import load, make_file
@@ -65,6 +67,7 @@ def simulate(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="The trajectory.  [default: renders/NAME.gsd]")
     ] = None,
+    resume: Resume = False,
     quiet: Quiet = False,
     threads: Threads = None,
     max_drift: MaxDrift = None,
@@ -74,7 +77,7 @@ def simulate(
         loaded = load(scene)
         from particlesim.jobs.movie import simulate as write_trajectory  # noqa: PLC0415
 
-        make_file(write_trajectory, loaded, path, quiet, threads, max_drift)
+        make_file(partial(write_trajectory, resume=resume), loaded, path, quiet, threads, max_drift)
 
 
 @app.command(short_help="Validate a scene and say what it amounts to.")
@@ -173,6 +176,9 @@ def doctor() -> None:
     if missing:
         # Below the table and on a line of its own, so that a command can be copied whole.
         fail("\n".join(missing), 1)
+
+
+app.command(short_help="Show partial runs, and remove them.")(clean)
 
 
 @app.command(short_help="Print the JSON Schema of scene files.")

@@ -25,6 +25,7 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but er
 Threads = Annotated[
     int | None, typer.Option("--threads", callback=_at_least_one, help="Threads to simulate with.  [default: all]")
 ]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on with a partial run of the same, if there is one.")]
 MaxDrift = Annotated[
     float | None,
     typer.Option(

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from particlesim.cli.errors import one_line_errors
-from particlesim.cli.options import MaxDrift, Quiet, Threads
+from particlesim.cli.errors import OptionError, one_line_errors
+from particlesim.cli.options import MaxDrift, Quiet, Resume, Threads
 from particlesim.cli.output import place_for
 from particlesim.cli.render_options import RenderOptions, frames_asked, scene_as_asked, still_time
 from particlesim.cli.run import load, make_file
@@ -56,6 +56,7 @@ def render(
         str | None,
         typer.Option("--scale", metavar="S", help="Simulate S times as many particles, sized to fill as much."),
     ] = None,
+    resume: Resume = False,
     quiet: Quiet = False,
     threads: Threads = None,
     max_drift: MaxDrift = None,
@@ -69,11 +70,13 @@ def render(
         _opened(source, options) as (subject, scene, total),
     ):
         time = still_time(scene.duration, options)
+        if time is not None and resume:
+            raise OptionError("--resume: of a movie, not of the one picture that --still asks for")
         chosen = None if time is not None else frames_asked(total, options)
         from particlesim.jobs import movie  # noqa: PLC0415
 
         if time is None:
-            make = partial(movie.render, look=scene, frames=chosen)
+            make = partial(movie.render, look=scene, frames=chosen, resume=resume)
         else:
             make = partial(movie.still, look=scene, time=time)
         make_file(make, subject, path, quiet, threads, max_drift)

@@ -31,8 +31,13 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
         yield hidden
         os.replace(hidden, path)
     except OSError as error:
-        if error.errno in _FULL:
-            error.filename = str(path)
+        named(error, path)
         raise
     finally:
         hidden.unlink(missing_ok=True)
+
+
+def named(error: OSError, path: Path) -> None:
+    """Let an error that says that a file does not fit where it is to go name the file that was wanted."""
+    if error.errno in _FULL:
+        error.filename = str(path)

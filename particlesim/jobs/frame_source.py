@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from particlesim.jobs.partial_run import PartialRun
 from particlesim.scene import Scene
 from particlesim.simulation.simulation import Simulation
 from particlesim.trajectory.frames import Frame, Header
@@ -24,23 +25,28 @@ _SPREAD = 33
 Progress = Callable[[str, int, int], None]
 
 
+# Frames with their numbers; None in place of one that is still being simulated, where a run may be left.
+Frames = Iterator[tuple[int, Frame | None]]
+
+
 class FrameSource(NamedTuple):
     """A scene, what stays the same about its particles, and their frames."""
 
     scene: Scene
     header: Header
     first: Frame  # of the whole run: what scales and changes refer to
-    frames: Iterator[tuple[int, Frame]]  # with their numbers, all that are simulated or read
+    frames: Frames  # all that are simulated or read
     total: int  # how many there are of them
     wanted: range  # numbers of those that are to be drawn
     phase: str  # what takes the time until the next
+    simulation: Simulation | None = None  # where it is, while it gives frames
     trajectory: Trajectory | None = None  # that they are read from, if they are
 
 
 def frames_ahead(
-    source: FrameSource, frames: Iterator[tuple[int, Frame]], progress: Progress | None
-) -> tuple[Iterator[tuple[int, Frame]], list[Frame]]:
-    """The frames of a source, and those of the run that tell before the first is drawn how its particles fare.
+    source: FrameSource, frames: Frames, progress: Progress | None, kept: int
+) -> tuple[Frames, list[Frame]]:
+    """The frames of a source but the ``kept`` first, and those that tell how particles fare in the whole run.
 
     They are spread over the whole of a trajectory; a scene is simulated ahead, as far as memory is to be had.
     """
@@ -48,11 +54,13 @@ def frames_ahead(
         stored = source.trajectory
         return frames, [stored[k] for k in _spread_over(len(stored))]
     size = sum(value.nbytes for value in vars(source.first).values() if isinstance(value, np.ndarray))
+    whole = ((number, frame) for number, frame in frames if frame is not None)
     held = []
-    for number, frame in itertools.islice(frames, max(1, _AHEAD // max(size, 1))):
+    for number, frame in itertools.islice(whole, max(1, _AHEAD // max(size, 1))):
         held.append((number, frame))
         tell(progress, source.phase, number + 1, source.total)
-    return itertools.chain(held, frames), [held[k][1] for k in _spread_over(len(held))]
+    sample = [held[k][1] for k in _spread_over(len(held))]
+    return itertools.dropwhile(lambda numbered: numbered[0] < kept, itertools.chain(held, whole)), sample
 
 
 @contextmanager
@@ -66,21 +74,31 @@ def opened(source: Scene | Trajectory | str | Path) -> Iterator[Scene | Trajecto
 
 
 def frame_source(
-    source: Scene | Trajectory, wanted: range | None, threads: int | None, progress: Progress | None
+    source: Scene | Trajectory,
+    wanted: range | None,
+    threads: int | None,
+    progress: Progress | None,
+    run: PartialRun | None = None,
 ) -> FrameSource:
     """All frames of a scene up to the last wanted one; of a trajectory those alone. None stands for all.
 
-    ValueError for frames that are not there.
+    Those that ``run`` kept are left out, unless it kept no state of the simulation that gives them. ValueError for
+    frames that are not there.
     """
+    kept = run.kept["done"] if run is not None and run.kept else 0
     if isinstance(source, Trajectory):
         wanted = _among(wanted, len(source))
-        stored = ((k, source[k]) for k in wanted)
-        return FrameSource(source.scene, source.header, source[0], stored, len(wanted), wanted, "reading", source)
+        stored = ((k, source[k]) for k in wanted[kept:])
+        header, first = source.header, source[0]
+        return FrameSource(source.scene, header, first, stored, len(wanted), wanted, "reading", trajectory=source)
     wanted = _among(wanted, source.frames)
     simulation = start(source, threads, progress)
+    header, first = simulation.header, simulation.frame()
+    if run is not None and run.state:
+        simulation = Simulation.load(run.state, threads=threads)
     total = max(wanted) + 1
-    frames = frames_of(simulation, total)
-    return FrameSource(source, simulation.header, simulation.frame(), frames, total, wanted, "simulating")
+    frames = frames_of(simulation, total, kept if run is not None and run.state else 0)
+    return FrameSource(source, header, first, frames, total, wanted, "simulating", simulation)
 
 
 def frame_source_until(
@@ -93,7 +111,7 @@ def frame_source_until(
     simulation = start(source, threads, progress)
     before = source.frame_at(time) + 1
 
-    def frames() -> Iterator[tuple[int, Frame]]:
+    def frames() -> Frames:
         yield from frames_of(simulation, before)
         simulation.run_until(time)
         yield before, simulation.frame()
@@ -108,11 +126,14 @@ def start(scene: Scene, threads: int | None, progress: Progress | None) -> Simul
     return Simulation(scene, threads=threads)
 
 
-def frames_of(simulation: Simulation, total: int) -> Iterator[tuple[int, Frame]]:
-    """The first frames of a scene and their numbers: at time zero and at every tick of its movie."""
-    yield 0, simulation.frame()
-    for k in range(1, total):
-        simulation.run_until(simulation.scene.time_of(k))
+def frames_of(simulation: Simulation, total: int, first: int = 0) -> Frames:
+    """Frames ``first`` to ``total`` - 1 of a scene and their numbers: at time zero and at every tick of its movie."""
+    for k in range(first, total):
+        end = simulation.scene.time_of(k)
+        while simulation.time < end:
+            simulation.step_towards(end)
+            if simulation.time < end:
+                yield k, None
         yield k, simulation.frame()
 
 

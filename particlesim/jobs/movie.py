@@ -2,45 +2,30 @@
 
 from __future__ import annotations
 
-import time as clock
-from collections.abc import Iterable, Iterator
+import os
 from pathlib import Path
-from typing import Any, TypeVar
-
-import numpy as np
 
 from particlesim.core.output_path import check_output
 from particlesim.jobs.compiling import compile_kernels
-from particlesim.jobs.drawers import Drawers
-from particlesim.jobs.frame_source import (
-    FrameSource,
-    Progress,
-    frame_source,
-    frame_source_until,
-    frames_ahead,
-    frames_of,
-    opened,
-    start,
-    tell,
-)
+from particlesim.jobs.frame_source import Progress, frame_source, frame_source_until, opened, tell
+from particlesim.jobs.partial_run import PartialRun
+from particlesim.jobs.pictures import Pictures, summary_of, timed
 from particlesim.jobs.summary import Summary
-from particlesim.rendering import write_image, write_movie
+from particlesim.jobs.task import task_of
+from particlesim.rendering import write_image
 from particlesim.rendering.gl import platform
-from particlesim.rendering.hud.history import History
-from particlesim.rendering.look import look_of
-from particlesim.rendering.shading.colour import encoded
-from particlesim.rendering.shading.fields import is_settled_by_frames
-from particlesim.rendering.video.fade import faded, strength
+from particlesim.rendering.video.segments import Segments
 from particlesim.scene import Scene
-from particlesim.setup.build import contact_laws_of
-from particlesim.trajectory.frames import Frame, Header
 from particlesim.trajectory.gsd_file import Trajectory, TrajectoryWriter
-
-_T = TypeVar("_T")
 
 
 def simulate(
-    scene: Scene, path: str | Path, *, progress: Progress | None = None, threads: int | None = None
+    scene: Scene,
+    path: str | Path,
+    *,
+    resume: bool = False,
+    progress: Progress | None = None,
+    threads: int | None = None,
 ) -> Summary:
     """Simulate a scene and write its trajectory (GSD). Needs neither OpenGL nor ffmpeg.
 
@@ -50,6 +35,8 @@ def simulate(
         What to simulate, to its end.
     path
         The file, which must end in .gsd; it appears when it is whole.
+    resume
+        Go on with a partial run, if there is one: the result is that of a run that was never interrupted.
     progress
         Called with what is going on, how many frames are done, and how many there will be.
     threads
@@ -63,6 +50,8 @@ def simulate(
     ------
     OutputError
         If no trajectory can be written to ``path``; found out before any work.
+    PartialRunError
+        If there is a partial run that is not to be gone on with, or is of another scene.
     SceneError
         If the scene cannot be built.
     SimulationError
@@ -71,14 +60,23 @@ def simulate(
         If the file cannot be written.
     """
     check_output(path, ".gsd")
-    compile_kernels(scene, None, progress)
-    simulation = start(scene, threads, progress)
-    summary = _summary(scene, simulation.header)
-    with TrajectoryWriter(path, simulation.header) as writer:
-        for _, frame in _timed(summary, "simulating", frames_of(simulation, scene.frames)):
-            writer.append(frame)
-            summary.add(frame)
-            tell(progress, "simulating", summary.frames, scene.frames)
+    with PartialRun(path, task_of(scene), resume) as run:
+        compile_kernels(scene, None, progress)
+        source = frame_source(scene, None, threads, progress, run)
+        summary = summary_of(scene, source.header)
+        if run.kept:
+            summary.go_on(run.kept["values"])
+        growing = run.folder / "trajectory.gsd"
+        with TrajectoryWriter(growing, source.header, summary.frames) as writer:
+            for _, frame in timed(summary, source.phase, source.frames):
+                if frame is not None:
+                    writer.append(frame)
+                    summary.add(frame)
+                    tell(progress, source.phase, summary.frames, source.total)
+                if run.due():
+                    writer.flush()
+                    run.keep(summary.frames, source.total, source.simulation, summary.table())
+        os.replace(growing, path)
     return summary
 
 
@@ -88,6 +86,7 @@ def render(
     *,
     look: Scene | None = None,
     frames: range | None = None,
+    resume: bool = False,
     progress: Progress | None = None,
     threads: int | None = None,
 ) -> Summary:
@@ -103,7 +102,7 @@ def render(
         Draws a trajectory as this scene says, in place of its own.
     frames
         Numbers of the frames to draw, all if None; a scene is simulated from its start to the last of them.
-    progress, threads
+    resume, progress, threads
         As for ``simulate``.
 
     Returns
@@ -118,20 +117,28 @@ def render(
         If the source is a file that is no trajectory, or damaged.
     ValueError
         For frames that are not there.
-    OutputError, SceneError, SimulationError, OSError
+    OutputError, PartialRunError, SceneError, SimulationError, OSError
         As for ``simulate``.
     """
     check_output(path, ".mp4", ".png")
-    with opened(source) as movable:
+    path = Path(path)
+    with opened(source) as movable, PartialRun(path, task_of(movable, look, frames), resume) as run:
         platform.choose()
         _compile(movable, look, progress)
-        chosen = frame_source(movable, frames, threads, progress)
+        chosen = frame_source(movable, frames, threads, progress, run)
         scene = look or chosen.scene
-        with MovieJob(chosen, scene, progress) as job:
-            times = write_movie(path, job.images(), scene.movie.fps, scene.movie.size, scene.movie.crf)
-            job.summary.seconds["encoding"] = times.encoding
-            write_image(Path(path).with_suffix(".png"), job.poster)
-    return job.summary
+        movie = scene.movie
+        with (
+            Pictures(chosen, scene, progress, run) as pictures,
+            Segments(run.folder, movie.fps, movie.size, movie.crf, pictures.summary.drawn) as segments,
+        ):
+            for image in pictures.images(segments.flush):
+                segments.send(image)
+            segments.join(run.folder / "whole.mp4", {})
+        pictures.summary.seconds["encoding"] = segments.seconds
+        write_image(path.with_suffix(".png"), pictures.poster)
+        os.replace(run.folder / "whole.mp4", path)
+    return pictures.summary
 
 
 def still(
@@ -170,85 +177,14 @@ def still(
         platform.choose()
         _compile(movable, look, progress)
         chosen = frame_source_until(time, movable, threads, progress)
-        with MovieJob(chosen, look or chosen.scene, progress) as job:
-            for _ in job.images():
+        with Pictures(chosen, look or chosen.scene, progress) as pictures:
+            for _ in pictures.images():
                 pass
-            write_image(path, job.poster)
-    return job.summary
+            write_image(path, pictures.poster)
+    return pictures.summary
 
 
 def _compile(source: Scene | Trajectory, look: Scene | None, progress: Progress | None) -> None:
     """Compile what pictures of a source need, its own or with the ``look`` of another scene."""
     own, simulated = (source.scene, None) if isinstance(source, Trajectory) else (source, source)
     compile_kernels(simulated, (look or own).movie, progress)
-
-
-class MovieJob:
-    """Makes the pictures of the frames of a source, as ``scene`` says. A context manager: it holds Drawers.
-
-    ``summary``: what the frames that have passed amount to. RenderError if this machine cannot draw.
-    """
-
-    def __init__(self, source: FrameSource, scene: Scene, progress: Progress | None) -> None:
-        self._source, self._movie, self._progress = source, scene.movie, progress
-        self.summary = _summary(scene, source.header)
-        self._frames = _timed(self.summary, source.phase, source.frames)
-        sample: list[Frame] = []
-        if is_settled_by_frames(scene):
-            self._frames, sample = frames_ahead(source, self._frames, progress)
-        self._drawers = Drawers(look_of(scene, source.header, source.first, sample), len(source.wanted))
-        self.poster = np.zeros((0, 0, 3), dtype=np.uint8)  # of the movie that images() gives
-
-    def __enter__(self) -> MovieJob:
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self._drawers.__exit__(*error)
-
-    def images(self) -> Iterator[np.ndarray]:
-        """The pictures of the movie, (h, w, 3) uint8, with its fades; all frames are taken into account on the way."""
-        movie, summary, count = self._movie, self.summary, len(self._source.wanted)
-        background = encoded(movie.background)
-        for image in self._drawers.draw(self._wanted()):
-            # A third of the way in, things have begun to happen.
-            if summary.drawn == count // 3:
-                self.poster = image
-            seen = strength(summary.drawn, count, movie.fade * movie.fps)
-            summary.drawn += 1
-            summary.seconds["drawing"] = self._drawers.seconds
-            self._tell()
-            yield faded(image, seen, background)
-
-    def _wanted(self) -> Iterator[tuple[Frame, History]]:
-        """The frames to draw, each with what its readout needs of those drawn before it."""
-        source, summary = self._source, self.summary
-        history = History().then(source.first.ledger)
-        for number, frame in self._frames:
-            summary.add(frame)
-            if number in source.wanted:
-                yield frame, history
-                history = history.then(frame.ledger)
-            else:
-                self._tell()
-
-    def _tell(self) -> None:
-        """Say how many frames are done: those that have passed, but for the pictures that are yet to come."""
-        tell(self._progress, "rendering", self.summary.frames - len(self._drawers.waiting), self._source.total)
-
-
-def _summary(scene: Scene, header: Header) -> Summary:
-    laws = contact_laws_of(scene)
-    elastic = bool((laws["restitution"] == 1.0).all() and (laws["friction"] == 0.0).all())
-    return Summary(float(header.mass.sum()), scene.world.gravity, elastic)
-
-
-def _timed(summary: Summary, name: str, passing: Iterable[_T]) -> Iterator[_T]:
-    """Pass things on and add up how long they were in coming, in ``summary.seconds``."""
-    source, seconds = iter(passing), summary.seconds
-    while True:
-        start = clock.perf_counter()
-        thing = next(source, None)
-        seconds[name] = seconds.get(name, 0.0) + clock.perf_counter() - start
-        if thing is None:
-            return
-        yield thing

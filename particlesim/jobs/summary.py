@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from particlesim.core.constants import DISSIPATION
-from particlesim.trajectory.frames import Frame, Ledger
+from particlesim.trajectory.frames import Frame, Ledger, ledger_of, ledger_table
 
 
 class Summary:
@@ -19,7 +19,7 @@ class Summary:
     """
 
     def __init__(self, total_mass: float, gravity: Any, elastic: bool = True) -> None:
-        self._mass, self._gravity = total_mass, np.asarray(gravity, dtype=np.float64)
+        self._mass, self._gravity = total_mass, tuple(gravity)
         self.elastic = elastic
         self._first: Ledger | None = None
         self._last: Ledger | None = None
@@ -29,6 +29,14 @@ class Summary:
         self.drawn = 0  # how many of the frames there are pictures of
         self.largest_overlap = 0.0
         self.seconds: dict[str, float] = {}  # spent in each part, but for what was done beside another
+
+    def table(self) -> dict[str, Any]:
+        """What has passed as plain values."""
+        return {name: ledger_table(value) if isinstance(value, Ledger) else value for name, value in vars(self).items()}
+
+    def go_on(self, table: dict[str, Any]) -> None:
+        """Go on after what had passed when ``table`` was made."""
+        vars(self).update({name: ledger_of(v) if name in ("_first", "_last") and v else v for name, v in table.items()})
 
     def add(self, frame: Frame) -> None:
         """Take a frame into account."""
@@ -92,6 +100,6 @@ class Summary:
             return 0.0
         first, last = self._first, self._last
         to_walls = last.given_to_walls - first.given_to_walls
-        fallen = self._mass * self._gravity * (last.time - first.time)
+        fallen = self._mass * np.array(self._gravity) * (last.time - first.time)
         error = last.momentum - first.momentum + to_walls - fallen
         return float(np.linalg.norm(error) / np.sqrt(2.0 * self._mass * self._largest_kinetic))

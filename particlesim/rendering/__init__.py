@@ -4,12 +4,12 @@ from typing import TYPE_CHECKING, Any
 
 from particlesim.rendering.errors import RenderError
 from particlesim.rendering.gl.platform import describe, describe_ffmpeg
-from particlesim.rendering.video.encoder import write_image, write_movie
+from particlesim.rendering.video.encoder import write_image
 
 if TYPE_CHECKING:
     from particlesim.rendering.renderer import Renderer
 
-__all__ = ["RenderError", "Renderer", "describe", "describe_ffmpeg", "write_image", "write_movie"]
+__all__ = ["RenderError", "Renderer", "describe", "describe_ffmpeg", "write_image"]
 
 
 def __getattr__(name: str) -> Any:

@@ -124,11 +124,15 @@ class Simulation:
     def run_until(self, end: float) -> None:
         """Advance to the time ``end`` [s], in equal steps as long as the automatic time step stays the same."""
         while self.time < end:
-            left = end - self.time
-            parts = math.ceil(left / self.next_time_step() - 1e-9)
-            self.step(left / max(parts, 1))
-            if parts <= 1:
-                self._solver.state.time = end
+            self.step_towards(end)
+
+    def step_towards(self, end: float) -> None:
+        """One of the time steps of ``run_until``: it ends at the time ``end`` [s] or before."""
+        left = end - self.time
+        parts = math.ceil(left / self.next_time_step() - 1e-9)
+        self.step(left / max(parts, 1))
+        if parts <= 1:
+            self._solver.state.time = end
 
     def next_time_step(self) -> float:
         """The scene's time step, or one in which particles move a little (STEP_FRACTION); at most one frame [s].

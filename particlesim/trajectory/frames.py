@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -49,6 +50,17 @@ class Ledger:
     def energy(self) -> float:
         """Kinetic and potential energy [J]."""
         return self.kinetic + self.potential
+
+
+def ledger_table(ledger: Ledger) -> dict[str, Any]:
+    """A ledger as plain values, which JSON keeps to the last bit."""
+    return {name: np.asarray(value).tolist() for name, value in vars(ledger).items() if value is not None}
+
+
+def ledger_of(table: dict[str, Any]) -> Ledger:
+    """The ledger of plain values."""
+    values: dict[str, Any] = {name: np.array(v) if isinstance(v, list) else v for name, v in table.items()}
+    return Ledger(**values)
 
 
 @dataclass(frozen=True)

@@ -100,8 +100,34 @@ class Chunks:
         return values.reshape(count, len(default))
 
 
+def cut(path: Path, frames: int) -> None:
+    """Let a GSD file hold its first ``frames`` frames only, as if no more had come. TrajectoryError if it is none."""
+    header, entries = _index(path)
+    # An index ends at the first entry that points nowhere; frames stand in it in their order.
+    entries[entries["frame"] >= frames] = 0
+    with path.open("r+b") as file:
+        file.seek(int(header["index_location"]))
+        file.write(entries.tobytes())
+
+
 def _check_index(path: Path) -> None:
     """TrajectoryError if a file is not GSD, or if its index points to what is not in it."""
+    size = os.path.getsize(path)
+    _, entries = _index(path)
+    entries = entries[: np.argmax(entries["location"] == 0) if (entries["location"] == 0).any() else None]
+    frame = entries["frame"]
+    # In float64: whole numbers of damaged files would overflow.
+    numbers = entries["rows"].astype(np.float64) * np.maximum(entries["columns"], 1)
+    known = (entries["type"] >= 1) & (entries["type"] < len(_TYPE_BYTES))
+    bytes_each = _TYPE_BYTES[np.where(known, entries["type"], 0)]
+    inside = (entries["location"] > 0) & (entries["location"] + numbers * bytes_each <= size)
+    ordered = (frame <= len(entries)) & (np.diff(frame.astype(np.float64), prepend=0.0) >= 0.0)
+    if not (known & inside & ordered).all():
+        raise TrajectoryError(f"{path}: damaged: its index points to what is not there")
+
+
+def _index(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """The header of a file and all places of its index. TrajectoryError if it is not GSD, or if they are not there."""
     size = os.path.getsize(path)
     with path.open("rb") as file:
         start = file.read(_HEADER.itemsize)
@@ -114,13 +140,4 @@ def _check_index(path: Path) -> None:
                 raise TrajectoryError(f"{path}: damaged: its {block} is not all there")
         file.seek(int(header["index_location"]))
         entries = np.frombuffer(file.read(_ENTRY.itemsize * int(header["index_entries"])), _ENTRY)
-    entries = entries[: np.argmax(entries["location"] == 0) if (entries["location"] == 0).any() else None]
-    frame = entries["frame"]
-    # In float64: whole numbers of damaged files would overflow.
-    numbers = entries["rows"].astype(np.float64) * np.maximum(entries["columns"], 1)
-    known = (entries["type"] >= 1) & (entries["type"] < len(_TYPE_BYTES))
-    bytes_each = _TYPE_BYTES[np.where(known, entries["type"], 0)]
-    inside = (entries["location"] > 0) & (entries["location"] + numbers * bytes_each <= size)
-    ordered = (frame <= len(entries)) & (np.diff(frame.astype(np.float64), prepend=0.0) >= 0.0)
-    if not (known & inside & ordered).all():
-        raise TrajectoryError(f"{path}: damaged: its index points to what is not there")
+    return header, entries.copy()

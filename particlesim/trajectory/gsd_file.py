@@ -7,19 +7,16 @@ the shape and size of every particle, and the ledger of every frame.
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import json
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import gsd.hoomd
 import numpy as np
 
-from particlesim.core.atomic_write import atomic_write
 from particlesim.core.constants import CAPSULE, DISSIPATION, SPHERE, WALL_NAMES
 from particlesim.core.rotations import conjugates, quaternion_products
 from particlesim.geometry.convex_hull import hull_polygons
@@ -27,7 +24,7 @@ from particlesim.geometry.shapes import Shape, capsule, principal_hull, sphere
 from particlesim.scene import Scene
 from particlesim.scene.file import stored_scene
 from particlesim.trajectory.frames import Frame, Header, Ledger
-from particlesim.trajectory.gsd_chunks import Chunks, TrajectoryError, reading
+from particlesim.trajectory.gsd_chunks import Chunks, TrajectoryError, cut, reading
 
 # Other programs draw a shape for each type and do not scale it. Groups of more sizes than this get that many types,
 # evenly spread; the exact sizes are in the file as well. All types of a group have no more corners than this, so that
@@ -71,24 +68,26 @@ _OLDER = "written by an older particlesim; simulate its scene again"
 
 
 class TrajectoryWriter:
-    """Writes frames to a GSD file, which appears when the ``with`` block ends well, and not otherwise."""
+    """Writes frames to a GSD file, after the first ``kept`` that are in it. A context manager."""
 
-    def __init__(self, path: str | Path, header: Header) -> None:
+    def __init__(self, path: Path, header: Header, kept: int = 0) -> None:
         self._header = header
         self._box = [*json.loads(header.scene_json)["world"]["size"], 0.0, 0.0, 0.0]
         self._types, self._type_of = _display_types(header)
-        self._files = contextlib.ExitStack()
-        hidden = self._files.enter_context(atomic_write(path))
-        self._file = self._files.enter_context(gsd.hoomd.open(str(hidden), "w"))
-        self._count = 0
+        if kept:
+            cut(path, kept)
+        self._file = gsd.hoomd.open(str(path), "r+" if kept else "w")
+        self._count = kept
 
     def __enter__(self) -> TrajectoryWriter:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._files.__exit__(kind, error, trace)
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def flush(self) -> None:
+        """Let all frames so far be in the file."""
+        self._file.flush()
 
     def append(self, frame: Frame) -> None:
         """Add a frame."""

@@ -1,4 +1,4 @@
-"""Images to a file: H.264 movies through ffmpeg, single images through Pillow. A file appears only when it is whole."""
+"""Images to a file: H.264 through ffmpeg, single images through Pillow."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import subprocess
 import tempfile
 import threading
 import time
-from collections.abc import Iterable
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 from PIL import Image
@@ -28,41 +27,6 @@ _WAITING = 4
 _THREADS = 4
 
 
-@dataclass(frozen=True)
-class MovieTimes:
-    """How a movie came about: frames, and seconds spent making the images and encoding them, side by side."""
-
-    frames: int
-    drawing: float
-    encoding: float
-
-
-def write_movie(
-    path: str | Path, images: Iterable[np.ndarray], fps: float, size: tuple[int, int], crf: int = 18
-) -> MovieTimes:
-    """Encode images (height, width, 3) uint8 sRGB of ``size`` (width, height, both even) as H.264, yuv420p.
-
-    ``crf`` is x264's constant rate factor, 0 (lossless) to 51 (smallest file). The same images give the same bytes.
-    Whatever goes wrong, ``path`` is whole or untouched. RenderError if ffmpeg fails or there is no image; ValueError
-    for an image of another size; OSError for a path that cannot be written.
-    """
-    with atomic_write(path) as hidden, _Encoder(_command(hidden, fps, size, crf), size) as encoder:
-        drawing, frames = 0.0, 0
-        source = iter(images)
-        while True:
-            start = time.perf_counter()
-            image = next(source, None)
-            drawing += time.perf_counter() - start
-            if image is None:
-                break
-            encoder.send(image)
-            frames += 1
-        if not frames:
-            raise RenderError(f"{path}: there are no frames to make a movie of")
-        encoder.finish()
-    return MovieTimes(frames, drawing, encoder.seconds)
-
-
 def write_image(path: str | Path, image: np.ndarray) -> None:
     """Write an image (height, width, 3) uint8 sRGB in the format of the path's ending, such as .png.
 
@@ -75,11 +39,16 @@ def write_image(path: str | Path, image: np.ndarray) -> None:
             raise RenderError(f"{path}: {error}") from error
 
 
-class _Encoder:
-    """ffmpeg in a process of its own, fed by a thread, so that the next image is drawn while one is encoded."""
+class Encoder:
+    """ffmpeg in a process of its own, fed by a thread, so that the next image is drawn while one is encoded.
 
-    def __init__(self, command: list[str], size: tuple[int, int]) -> None:
+    It encodes images (height, width, 3) uint8 sRGB of ``size`` (width, height, both even) to ``path``, H.264, yuv420p.
+    The same images give the same bytes. ``close`` ends it, whatever it is at; ``seconds`` were spent encoding.
+    """
+
+    def __init__(self, path: Path, fps: float, size: tuple[int, int], crf: int) -> None:
         self._size = size
+        command = _command(path, fps, size, crf)
         self._log = tempfile.TemporaryFile()  # noqa: SIM115  (closed in __exit__)
         # A session of its own: Ctrl-C is for us to handle, and ends ffmpeg from here.
         self._process = subprocess.Popen(
@@ -91,10 +60,8 @@ class _Encoder:
         self._feeder.start()
         self.seconds = 0.0
 
-    def __enter__(self) -> _Encoder:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
+        """End ffmpeg if it has not ended, and free what it took."""
         if self._process.poll() is None:
             self._process.kill()
         self._images.put(None)
@@ -103,7 +70,7 @@ class _Encoder:
         self._log.close()
 
     def send(self, image: np.ndarray) -> None:
-        """Hand over an image, waiting while the encoder is behind."""
+        """Hand over an image, waiting while ffmpeg is behind. ValueError for another size, RenderError if it fails."""
         width, height = self._size
         if image.shape != (height, width, 3) or image.dtype != np.uint8:
             raise ValueError(f"an image of shape {image.shape} {image.dtype}, not {(height, width, 3)} uint8")
@@ -112,7 +79,7 @@ class _Encoder:
         self._images.put(np.ascontiguousarray(image))
 
     def finish(self) -> None:
-        """Wait until all is encoded."""
+        """Wait until all is encoded. RenderError if it fails."""
         self._images.put(None)
         self._feeder.join()
         start = time.perf_counter()
@@ -135,13 +102,18 @@ class _Encoder:
         with contextlib.suppress(OSError):
             pipe.close()
 
-    def _fail(self) -> None:
+    def _fail(self) -> NoReturn:
         status = self._process.wait()
         self._log.seek(0)
-        lines = self._log.read().decode(errors="replace").split("\n")
-        last = next((line.strip() for line in reversed(lines) if line.strip()), "no message")
-        how = f"was ended by {signal.Signals(-status).name}" if status < 0 else f"failed with exit status {status}"
-        raise RenderError(f"ffmpeg {how}: {last}")
+        raise failure(status, self._log.read())
+
+
+def failure(status: int, log: bytes) -> RenderError:
+    """The error that says how ffmpeg ended, with the last line that it wrote."""
+    lines = log.decode(errors="replace").split("\n")
+    last = next((line.strip() for line in reversed(lines) if line.strip()), "no message")
+    how = f"was ended by {signal.Signals(-status).name}" if status < 0 else f"failed with exit status {status}"
+    return RenderError(f"ffmpeg {how}: {last}")
 
 
 def _command(path: Path, fps: float, size: tuple[int, int], crf: int) -> list[str]:
@@ -154,5 +126,5 @@ def _command(path: Path, fps: float, size: tuple[int, int], crf: int) -> list[st
     # No versions, dates or settings in the file (unit type 6): the same images, the same bytes.
     bare = ["-fflags", "+bitexact", "-flags:v", "+bitexact", "-bsf:v", "filter_units=remove_types=6"]
     # A path as it is: "12:30.mp4" would be a protocol.
-    target = ["-movflags", "+faststart", "-f", "mp4", f"file:{path}"]
+    target = ["-f", "mp4", f"file:{path}"]
     return [ffmpeg(), "-y", "-v", "error", *source, "-an", "-vf", scale, *codec, *tags, *bare, *target]

@@ -1,0 +1,131 @@
+"""The pictures of the frames of a source, in their order, and what the frames amount to."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, TypeVar
+
+import numpy as np
+
+from particlesim.jobs.drawers import Drawers
+from particlesim.jobs.frame_source import FrameSource, Progress, frames_ahead, tell
+from particlesim.jobs.partial_run import PartialRun
+from particlesim.jobs.summary import Summary
+from particlesim.rendering.hud.history import History
+from particlesim.rendering.look import look_of
+from particlesim.rendering.shading.colour import encoded
+from particlesim.rendering.shading.fields import is_settled_by_frames
+from particlesim.rendering.video.fade import faded, strength
+from particlesim.scene import Scene
+from particlesim.setup.build import contact_laws_of
+from particlesim.trajectory.frames import Frame, Header, ledger_of, ledger_table
+
+_T = TypeVar("_T")
+
+_POSTER = "poster.npy"
+
+
+class Pictures:
+    """Makes the pictures of the frames of a source, as ``scene`` says. A context manager: it holds Drawers.
+
+    With a ``run`` it goes on where that was left, and keeps in it what is done. ``summary``: what the frames that have
+    passed amount to. RenderError if this machine cannot draw.
+    """
+
+    def __init__(
+        self, source: FrameSource, scene: Scene, progress: Progress | None, run: PartialRun | None = None
+    ) -> None:
+        self._source, self._movie, self._progress, self._run = source, scene.movie, progress, run
+        self.summary = summary_of(scene, source.header)
+        self._history = History().then(source.first.ledger)
+        self.poster = np.zeros((0, 0, 3), dtype=np.uint8)  # of the movie that images() gives
+        if run is not None and run.kept:
+            self._go_on(run, run.kept["values"])
+        self._frames = timed(self.summary, source.phase, source.frames)
+        # What is simulated ahead is not where the pictures are: such a run is simulated anew when it is gone on with.
+        self._simulation = None if is_settled_by_frames(scene) else source.simulation
+        sample: list[Frame] = []
+        if is_settled_by_frames(scene):
+            self._frames, sample = frames_ahead(source, self._frames, progress, self.summary.frames)
+        self._drawers = Drawers(look_of(scene, source.header, source.first, sample), len(source.wanted))
+        self._drawers.seconds = self.summary.seconds.get("drawing", 0.0)
+
+    def __enter__(self) -> Pictures:
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._drawers.__exit__(*error)
+
+    def images(self, flush: Callable[[], None] = lambda: None) -> Iterator[np.ndarray]:
+        """The pictures of the movie, (h, w, 3) uint8, with its fades; all frames are taken into account on the way.
+
+        ``flush`` is called when all that came before is to be kept.
+        """
+        movie, summary, count = self._movie, self.summary, len(self._source.wanted)
+        background = encoded(movie.background)
+        while summary.frames < self._source.total:
+            for image in self._drawers.draw(self._until_due()):
+                # A third of the way in, things have begun to happen.
+                if summary.drawn == count // 3:
+                    self._keep_poster(image)
+                seen = strength(summary.drawn, count, movie.fade * movie.fps)
+                summary.drawn += 1
+                summary.seconds["drawing"] = self._drawers.seconds
+                self._tell()
+                yield faded(image, seen, background)
+            if self._run is not None and self._run.due():
+                flush()
+                self._keep(self._run)
+
+    def _until_due(self) -> Iterator[tuple[Frame, History]]:
+        """Frames to draw, each with what its readout needs of those before it, until something is to be kept."""
+        for number, frame in self._frames:
+            if frame is not None:
+                self.summary.add(frame)
+                if number in self._source.wanted:
+                    yield frame, self._history
+                    self._history = self._history.then(frame.ledger)
+                else:
+                    self._tell()
+            if self._run is not None and self._run.due():
+                return
+
+    def _keep(self, run: PartialRun) -> None:
+        history = [ledger_table(ledger) for ledger in self._history.ledgers]
+        values = {"summary": self.summary.table(), "history": history}
+        run.keep(self.summary.frames, self._source.total, self._simulation, values)
+
+    def _go_on(self, run: PartialRun, values: dict[str, Any]) -> None:
+        self.summary.go_on(values["summary"])
+        self._history = History(tuple(ledger_of(table) for table in values["history"]))
+        if (run.folder / _POSTER).exists():
+            self.poster = np.load(run.folder / _POSTER)
+
+    def _keep_poster(self, image: np.ndarray) -> None:
+        self.poster = image
+        if self._run is not None:
+            np.save(self._run.folder / _POSTER, image)
+
+    def _tell(self) -> None:
+        """Say how many frames are done: those that have passed, but for the pictures that are yet to come."""
+        tell(self._progress, "rendering", self.summary.frames - len(self._drawers.waiting), self._source.total)
+
+
+def summary_of(scene: Scene, header: Header) -> Summary:
+    """The summary of a run of a scene, before its first frame."""
+    laws = contact_laws_of(scene)
+    elastic = bool((laws["restitution"] == 1.0).all() and (laws["friction"] == 0.0).all())
+    return Summary(float(header.mass.sum()), scene.world.gravity, elastic)
+
+
+def timed(summary: Summary, name: str, passing: Iterable[_T]) -> Iterator[_T]:
+    """Pass things on and add up how long they were in coming, in ``summary.seconds``."""
+    source, seconds = iter(passing), summary.seconds
+    while True:
+        start = clock.perf_counter()
+        thing = next(source, None)
+        seconds[name] = seconds.get(name, 0.0) + clock.perf_counter() - start
+        if thing is None:
+            return
+        yield thing

@@ -1,0 +1,201 @@
+"""Runs that are killed go on as if they had never been; what is left of one is never lost in silence."""
+
+import os
+import random
+import signal
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import particlesim as ps
+from particlesim.cli import main as cli
+from particlesim.core.interrupts import Interrupted
+from particlesim.jobs import partial_run
+from particlesim.jobs.partial_run import PartialRunError, folder_of
+from particlesim.rendering import RenderError
+from particlesim.rendering.video import segments
+from tests import killed
+from tests.worlds import gas
+
+SCENE = """
+duration = 2.5
+[world]
+size = [3, 3, 3]
+[movie]
+resolution = [96, 64]
+[show]
+readout = true
+[[particles]]
+shape = "cube"
+count = 25
+size = 0.4
+colour = "by_speed"
+velocity = { kind = "maxwell", temperature = 10 }
+"""
+
+
+@pytest.fixture
+def always(monkeypatch):
+    """Keep what is done after every step."""
+    monkeypatch.setattr(partial_run, "INTERVAL", 0.0)
+    monkeypatch.setattr(partial_run, "_SPARE", 0.0)
+
+
+def stopped(frames, error=KeyboardInterrupt):
+    """A progress that interrupts a run after so many frames."""
+
+    def progress(phase, done, total):
+        if done >= frames:
+            raise error
+
+    return progress
+
+
+def some(**settings):
+    return gas(3, **{"duration": 2.5, "movie": {"resolution": [64, 64], "fps": 30}, **settings})
+
+
+@pytest.mark.parametrize("name", ["run.gsd", "movie.mp4"])
+def test_killed_at_any_moment_it_ends_as_if_it_had_not_been(tmp_path, name):
+    scene, path = tmp_path / "scene.toml", tmp_path / name
+    scene.write_text(SCENE)
+    killed.run(scene, tmp_path / f"straight_{name}")
+    rng = random.Random(17)
+    kills = 0
+    while killed.run(scene, path, rng.uniform(0.4, 1.2)) and kills < 4:
+        kills += 1
+        assert not path.exists()
+    killed.run(scene, path)
+    assert killed.content(path) == killed.content(tmp_path / f"straight_{name}")
+    if name == "movie.mp4":
+        for suffix in (".mp4", ".png"):
+            straight = (tmp_path / "straight_movie").with_suffix(suffix)
+            assert path.with_suffix(suffix).read_bytes() == straight.read_bytes()
+    assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.parametrize("name", ["run.gsd", "movie.mp4"])
+def test_left_again_and_again_it_has_the_same_bytes(tmp_path, always, name):
+    make = ps.simulate if name == "run.gsd" else ps.render
+    make(some(), tmp_path / f"straight_{name}")
+    for frames in (5, 20, 59, 60, 61, 74):
+        with pytest.raises(KeyboardInterrupt) as stop:
+            make(some(), tmp_path / name, resume=True, progress=stopped(frames))
+        assert "of 76 frames are kept in" in stop.value.__notes__[0]
+    summary = make(some(), tmp_path / name, resume=True)
+    assert summary.frames == 76 and summary.drawn == (76 if name == "movie.mp4" else 0)
+    assert killed.content(tmp_path / name) == killed.content(tmp_path / f"straight_{name}")
+
+
+def test_some_frames_of_a_trajectory_go_on_too(tmp_path, always):
+    ps.simulate(some(), tmp_path / "run.gsd")
+    for name, stops in (("straight.mp4", ()), ("left.mp4", (5, 31))):
+        for frames in stops:
+            with pytest.raises(KeyboardInterrupt):
+                ps.render(
+                    tmp_path / "run.gsd", tmp_path / name, frames=range(3, 70, 2), resume=True, progress=stopped(frames)
+                )
+        ps.render(tmp_path / "run.gsd", tmp_path / name, frames=range(3, 70, 2), resume=True)
+    assert (tmp_path / "straight.mp4").read_bytes() == (tmp_path / "left.mp4").read_bytes()
+
+
+def left(path, frames=10, **settings):
+    """Leave a partial run."""
+    with pytest.raises(KeyboardInterrupt):
+        ps.simulate(some(**settings), path, progress=stopped(frames))
+    return folder_of(path)
+
+
+def test_what_is_there_is_neither_overwritten_nor_gone_on_with_in_silence(tmp_path, always):
+    path = tmp_path / "run.gsd"
+    folder = left(path)
+    before = {file.name: file.read_bytes() for file in folder.iterdir()}
+    with pytest.raises(PartialRunError, match=r"of 76 frames, in .*--resume goes on .*clean --remove .*run.gsd"):
+        ps.simulate(some(), path)
+    assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [
+        ({"seed": 2}, "seed was 1 and is 2"),
+        ({"duration": 2.0}, "duration was 2.5 and is 2.0"),
+        ({"size": (2.5, 2.5, 2.6)}, r"world.size\[2\] was 2.5 and is 2.6"),
+    ],
+)
+def test_another_scene_is_refused_by_the_key_that_differs(tmp_path, always, change, key):
+    left(tmp_path / "run.gsd")
+    with pytest.raises(PartialRunError, match=key):
+        ps.simulate(some(**change), tmp_path / "run.gsd", resume=True)
+    ps.simulate(some(), tmp_path / "run.gsd", resume=True)
+
+
+def test_what_ended_before_anything_was_kept_leaves_nothing(tmp_path):
+    with pytest.raises(KeyboardInterrupt):
+        ps.simulate(some(), tmp_path / "run.gsd", progress=stopped(3))
+    assert not list(tmp_path.iterdir())
+    folder_of(tmp_path / "run.gsd").mkdir()
+    (folder_of(tmp_path / "run.gsd") / "trajectory.gsd").write_text("torn")
+    ps.simulate(some(), tmp_path / "run.gsd")
+    assert [file.name for file in tmp_path.iterdir()] == ["run.gsd"]
+
+
+def test_a_second_run_of_the_same_output_is_refused(tmp_path):
+    def second(phase, done, total):
+        with pytest.raises(PartialRunError, match="another run is at work on it"):
+            ps.simulate(some(), tmp_path / "run.gsd", resume=True)
+
+    ps.simulate(some(duration=0.1), tmp_path / "run.gsd", progress=second)
+
+
+def test_clean_shows_and_removes(tmp_path, always, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    invoke = CliRunner().invoke
+    assert invoke(cli.app, ["clean"]).output == "no partial runs\n"
+    folder = left(tmp_path / "run.gsd")
+    assert "of 76 frames" in invoke(cli.app, ["clean"]).output and folder.exists()
+    assert "removed" in invoke(cli.app, ["clean", "--remove", "run.gsd"]).output and not folder.exists()
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupted_command_says_what_is_kept(tmp_path, always, monkeypatch, number, code):
+    (tmp_path / "a.toml").write_text(SCENE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("particlesim.cli.progress._Lines.__call__", lambda *a: stopped(9, Interrupted(number))(*a[1:]))
+    result = CliRunner().invoke(cli.app, ["simulate", "a.toml"])
+    assert result.exit_code == code
+    assert result.output.endswith("of 76 frames are kept in renders/.a.gsd.partial; --resume goes on with them\n")
+
+
+def test_a_killed_ffmpeg_is_named_and_gone_on_from(tmp_path, always):
+    def kill(phase, done, total):
+        if done == 30:
+            for child in os.listdir("/proc"):
+                if child.isdigit() and is_ffmpeg_of_ours(child):
+                    os.kill(int(child), signal.SIGKILL)
+
+    ps.render(some(), tmp_path / "straight.mp4")
+    with pytest.raises(RenderError, match="ffmpeg was ended by SIGKILL") as error:
+        ps.render(some(), tmp_path / "a.mp4", progress=kill)
+    assert "kept" in error.value.__notes__[0]
+    ps.render(some(), tmp_path / "a.mp4", resume=True)
+    assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "straight.mp4").read_bytes()
+
+
+def is_ffmpeg_of_ours(process):
+    try:
+        with open(f"/proc/{process}/stat") as file:
+            name, rest = file.read().rsplit(")", 1)
+        return "ffmpeg" in name and int(rest.split()[1]) == os.getpid()
+    except OSError:
+        return False
+
+
+def test_segments_are_as_long_as_pictures_say_not_the_clock(tmp_path):
+    assert segments.SEGMENT == 60
+    rng = np.random.default_rng(3)
+    with segments.Segments(tmp_path, 30.0, (32, 32), 18) as movie:
+        for _ in range(130):
+            movie.send(rng.integers(0, 255, (32, 32, 3), dtype=np.uint8))
+        assert sorted(file.name for file in tmp_path.glob("*.mp4")) == ["000000.mp4", "000001.mp4"]
