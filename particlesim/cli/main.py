@@ -12,6 +12,7 @@ import typer
 from particlesim.cli.bench import measure_drawing, measure_steps
 from particlesim.cli.clean import clean
 from particlesim.cli.errors import fail, one_line_errors
+from particlesim.cli.info import info
 from particlesim.cli.options import MaxDrift, Quiet, Resume, SceneArgument, Threads
 from particlesim.cli.output import place_for
 from particlesim.cli.render import render
@@ -178,6 +179,7 @@ def doctor() -> None:
         fail("\n".join(missing), 1)
 
 
+app.command(short_help="Say where a movie, a picture or a trajectory comes from.")(info)
 app.command(short_help="Show partial runs, and remove them.")(clean)
 
 

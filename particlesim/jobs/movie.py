@@ -10,6 +10,7 @@ from particlesim.jobs.compiling import compile_kernels
 from particlesim.jobs.frame_source import Progress, frame_source, frame_source_until, opened, tell
 from particlesim.jobs.partial_run import PartialRun
 from particlesim.jobs.pictures import Pictures, summary_of, timed
+from particlesim.jobs.provenance import as_tags, as_text, provenance
 from particlesim.jobs.summary import Summary
 from particlesim.jobs.task import task_of
 from particlesim.rendering import write_image
@@ -134,9 +135,10 @@ def render(
         ):
             for image in pictures.images(segments.flush):
                 segments.send(image)
-            segments.join(run.folder / "whole.mp4", {})
+            origin = provenance(chosen.header, pictures.summary, chosen.wanted)
+            segments.join(run.folder / "whole.mp4", as_tags(origin))
         pictures.summary.seconds["encoding"] = segments.seconds
-        write_image(path.with_suffix(".png"), pictures.poster)
+        write_image(path.with_suffix(".png"), pictures.poster, as_text(origin))
         os.replace(run.folder / "whole.mp4", path)
     return pictures.summary
 
@@ -180,7 +182,7 @@ def still(
         with Pictures(chosen, look or chosen.scene, progress) as pictures:
             for _ in pictures.images():
                 pass
-            write_image(path, pictures.poster)
+            write_image(path, pictures.poster, as_text(provenance(chosen.header, pictures.summary, chosen.wanted)))
     return pictures.summary
 
 

@@ -8,6 +8,7 @@ the shape and size of every particle, and the ledger of every frame.
 from __future__ import annotations
 
 import functools
+import importlib.metadata
 import json
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields
@@ -155,6 +156,13 @@ class Trajectory:
             raise TrajectoryError(f"{self.path}: damaged: its particles are not those of its scene")
         return scene
 
+    @property
+    def version(self) -> str | None:
+        """The version of particlesim that wrote it; None if it does not say."""
+        name = _LOG + "version"
+        with reading(self.path):
+            return self._chunks.read(name).tobytes().decode() if self._chunks.has(name) else None
+
     def time(self, k: int) -> float:
         """The time of frame ``k`` [s]."""
         with reading(self.path):
@@ -246,6 +254,7 @@ def _header_log(header: Header) -> dict[str, np.ndarray]:
         for s in header.shapes
     ]
     return {
+        _LOG + "version": np.frombuffer(importlib.metadata.version("particlesim").encode(), dtype=np.uint8),
         _LOG + "scene": np.frombuffer(header.scene_json.encode(), dtype=np.uint8),
         _LOG + "shapes": np.frombuffer(json.dumps(shapes).encode(), dtype=np.uint8),
         _LOG + "shape": header.shape.astype(np.int32),

@@ -9,12 +9,14 @@ import subprocess
 import tempfile
 import threading
 import time
+from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from particlesim.core.atomic_write import atomic_write
 from particlesim.rendering.errors import RenderError
@@ -27,14 +29,17 @@ _WAITING = 4
 _THREADS = 4
 
 
-def write_image(path: str | Path, image: np.ndarray) -> None:
-    """Write an image (height, width, 3) uint8 sRGB in the format of the path's ending, such as .png.
+def write_image(path: str | Path, image: np.ndarray, text: Mapping[str, str] | None = None) -> None:
+    """Write an image (height, width, 3) uint8 sRGB in the format of the path's ending, such as .png, and texts with it.
 
     RenderError for an ending that stands for no format; OSError for a path that cannot be written.
     """
+    written = PngInfo()
+    for name, words in (text or {}).items():
+        written.add_text(name, words)
     with atomic_write(path) as hidden:
         try:
-            Image.fromarray(image).save(hidden)
+            Image.fromarray(image).save(hidden, pnginfo=written)
         except ValueError as error:
             raise RenderError(f"{path}: {error}") from error
 

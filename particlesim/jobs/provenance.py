@@ -1,0 +1,144 @@
+"""Where a movie, a picture or a trajectory comes from: written into it, and read from it again."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import json
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image, UnidentifiedImageError
+
+from particlesim.jobs.frame_source import Progress, start, tell
+from particlesim.jobs.pictures import summary_of
+from particlesim.jobs.summary import Summary
+from particlesim.rendering.gl.platform import ffmpeg
+from particlesim.trajectory.frames import Frame, Header, ledger_table
+from particlesim.trajectory.gsd_file import Trajectory
+
+# The name of the text in PNG files, and of the tag in movies: the one that every player and ffmpeg knows.
+_TEXT, _TAG = "particlesim", "comment"
+
+
+class ProvenanceError(ValueError):
+    """A file that does not say where it comes from; the message is one line."""
+
+
+def provenance(header: Header, summary: Summary, frames: range) -> dict[str, Any]:
+    """What a result is of, as plain values.
+
+    Parameters
+    ----------
+    header
+        Of its particles.
+    summary
+        Of all frames up to the last that is in it.
+    frames
+        Numbers of those that are in it.
+
+    Returns
+    -------
+    ``version`` of particlesim, ``scene`` (SHA-256 of the scene as JSON), ``title``, ``seed``, ``energy_drift`` (the
+    largest, as a fraction of all energy), ``frames`` (first, end, step).
+    """
+    scene = json.loads(header.scene_json)
+    return {
+        "version": importlib.metadata.version("particlesim"),
+        "scene": hashlib.sha256(header.scene_json.encode()).hexdigest(),
+        "title": scene["title"],
+        "seed": scene["seed"],
+        "energy_drift": summary.worst_energy_drift,
+        "frames": [frames.start, frames.stop, frames.step],
+    }
+
+
+def as_tags(values: dict[str, Any]) -> dict[str, str]:
+    """Provenance as tags of a movie."""
+    return {"title": values["title"], _TAG: json.dumps({_TEXT: values})}
+
+
+def as_text(values: dict[str, Any]) -> dict[str, str]:
+    """Provenance as texts of a PNG file."""
+    return {_TEXT: json.dumps(values)}
+
+
+def read_provenance(path: str | Path) -> dict[str, Any]:
+    """Where a movie, picture or trajectory comes from, as ``provenance`` says it.
+
+    ProvenanceError if it does not say; TrajectoryError for a damaged trajectory; OSError if it cannot be read.
+    """
+    path = Path(path)
+    read = {".gsd": _of_trajectory, ".mp4": _of_movie, ".png": _of_picture}.get(path.suffix.lower())
+    if read is None:
+        raise ProvenanceError(f"{path}: must be a movie (.mp4), a picture (.png) or a trajectory (.gsd)")
+    with path.open("rb"):  # or the system says why not
+        pass
+    values = read(path)
+    if not isinstance(values, dict):
+        raise ProvenanceError(f"{path}: does not say where it comes from")
+    return values
+
+
+def replayed(trajectory: Trajectory, number: int, threads: int | None, progress: Progress | None) -> tuple[str, str]:
+    """Hashes of a frame as it is in a trajectory, and as its scene gives it when it is simulated again.
+
+    They cover the time, all that is stored of the particles, and the ledger. IndexError if there is no such frame.
+    """
+    stored = trajectory[number]
+    simulation = start(trajectory.scene, threads, progress)
+    for k in range(number + 1):
+        simulation.run_until(simulation.scene.time_of(k))
+        tell(progress, "simulating", k, number + 1)
+    return _digest(stored), _digest(simulation.frame())
+
+
+def _digest(frame: Frame) -> str:
+    """SHA-256 of what a file keeps of a frame."""
+    total = hashlib.sha256()
+    for single in (frame.position, frame.orientation, frame.velocity):
+        total.update(single.astype(np.float32).tobytes())
+    for whole in (frame.image, frame.impacts):
+        total.update(whole.astype(np.int64).tobytes())
+    assert frame.ledger is not None
+    total.update(json.dumps([frame.time, ledger_table(frame.ledger)], sort_keys=True).encode())
+    return total.hexdigest()
+
+
+def _of_trajectory(path: Path) -> Any:
+    with Trajectory(path) as trajectory:
+        summary = summary_of(trajectory.scene, trajectory.header)
+        for frame in trajectory:
+            summary.add(frame)
+        return {**provenance(trajectory.header, summary, range(len(trajectory))), "version": trajectory.version}
+
+
+def _of_movie(path: Path) -> Any:
+    command = [ffmpeg(), "-v", "error", "-i", f"file:{path}", "-f", "ffmetadata", "-"]
+    done = subprocess.run(command, capture_output=True, check=False)
+    # One tag a line; what would end it stands behind a backslash.
+    text = done.stdout.decode(errors="replace").replace("\\\n", "\n")
+    tag = next((line for line in text.split("\n") if line.startswith(f"{_TAG}=")), "")
+    for letter in "=;#\\":
+        tag = tag.replace(f"\\{letter}", letter)
+    return _parsed(tag.removeprefix(f"{_TAG}="), _TEXT)
+
+
+def _of_picture(path: Path) -> Any:
+    try:
+        with Image.open(path) as image:
+            return _parsed(str(image.info.get(_TEXT, "")))
+    except UnidentifiedImageError:
+        raise ProvenanceError(f"{path}: not a picture") from None
+
+
+def _parsed(text: str, *keys: str) -> Any:
+    try:
+        value = json.loads(text)
+        for key in keys:
+            value = value[key]
+        return value
+    except (ValueError, KeyError, TypeError):
+        return None
