@@ -83,6 +83,10 @@ def test_files_that_are_no_scenes(tmp_path):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(ps.SceneError, match=r"is not a text file \(in UTF-8\), so not a scene$"):
             ps.load_scene(tmp_path / name)
+    with (tmp_path / "large.toml").open("wb") as file:
+        file.truncate(100_000_000)
+    with pytest.raises(ps.SceneError, match=r"large.toml: has 100 MB: a scene file has 20 MB at most$"):
+        ps.load_scene(tmp_path / "large.toml")
     with pytest.raises(ps.SceneError, match=r"is a folder, not a scene file$"):
         ps.load_scene(tmp_path)
     (tmp_path / "gas.toml").write_text(GOOD)

@@ -11,6 +11,9 @@ from particlesim.scene import Scene
 from particlesim.scene.base import paths_from
 from particlesim.scene.errors import SceneError
 
+# Bytes of a scene file at most, as of a hundred thousand poses: to read 100 MB takes more than a minute.
+_LARGEST = 20_000_000
+
 
 def load_scene(path: str | Path) -> Scene:
     """Read and check a scene file (TOML). SceneError, in one line, if it cannot be read or is wrong."""
@@ -45,8 +48,11 @@ def stored_scene(table: dict[str, Any]) -> Scene:
 
 
 def _text(path: Path) -> str:
-    """What the file says. SceneError if it is no text."""
+    """What the file says. SceneError if it is no text, or too much."""
     try:
+        if path.stat().st_size > _LARGEST:
+            size = path.stat().st_size / 1e6
+            raise SceneError(f"has {size:,.0f} MB: a scene file has {_LARGEST // 1_000_000} MB at most", file=path)
         # Some editors put a mark of the encoding before the text.
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
