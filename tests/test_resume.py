@@ -2,6 +2,7 @@
 
 import os
 import random
+import shutil
 import signal
 
 import numpy as np
@@ -139,6 +140,16 @@ def test_what_ended_before_anything_was_kept_leaves_nothing(tmp_path):
     (folder_of(tmp_path / "run.gsd") / "trajectory.gsd").write_text("torn")
     ps.simulate(some(), tmp_path / "run.gsd")
     assert [file.name for file in tmp_path.iterdir()] == ["run.gsd"]
+
+
+def test_a_folder_that_is_gone_is_not_said_to_be_kept(tmp_path, always):
+    def take_away(phase, done, total):
+        if done == 9:
+            shutil.rmtree(folder_of(tmp_path / "run.gsd"))
+
+    with pytest.raises(FileNotFoundError, match="there is no folder") as error:
+        ps.simulate(some(), tmp_path / "run.gsd", progress=take_away)
+    assert not hasattr(error.value, "__notes__") and not list(tmp_path.iterdir())
 
 
 def test_a_second_run_of_the_same_output_is_refused(tmp_path):

@@ -79,7 +79,7 @@ class PartialRun:
         os.close(self._lock)
         if isinstance(error, OSError):
             named(error, self._path)
-        if error is not None and self.kept is not None:
+        if error is not None and self.kept is not None and (self.folder / _INDEX).exists():
             error.add_note(f"{_frames(self.kept)} are kept in {folder_of(self._path)}; --resume goes on with them")
 
     @property
