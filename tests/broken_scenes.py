@@ -4,7 +4,7 @@
 WORLD = "[world]\nsize = [4.0, 4.0, 4.0]\n"
 GROUP = '[[particles]]\nshape = "sphere"\ncount = 10\nsize = 0.2\n'
 GOOD = WORLD + GROUP
-ALL_KEYS = "title, seed, duration, world, particles, contact, solver, movie, camera, show"
+ALL_KEYS = "title, seed, duration, world, particles, obstacles, contact, solver, movie, camera, show"
 VECTOR = "must be a list of 3 finite numbers, [x, y, z]"
 COUNT = "must be a whole number from 0 to 100,000,000"
 SIZE = 'must be a number above 0, or a table such as { kind = "uniform", low = 0.1, high = 0.2 }'
@@ -15,7 +15,7 @@ ROWS = (
     "must be true, false or a list of 'time', 'particles', 'impacts', 'energy change', 'dissipation', 'temperature', 'pressure', "
     "'speed', 'pairs tested' or 'broad phases'"
 )
-TWO = "must be the names of two groups, or of one and 'walls', such as ['a', 'b']"
+TWO = "must be the names of two groups, or of one and an obstacle or 'walls', such as ['a', 'b']"
 RANGE = "must be [low, high], two numbers, low below high"
 PIXELS = "must be [width, height] in pixels, two even whole numbers from 64 to 7680"
 
@@ -51,10 +51,55 @@ def path_of(*keys):
     return GOOD + f'[camera]\nkind = "path"\nkeys = [{", ".join(keys)}]\n'
 
 
+def obstacle(shape='"cube"', **keys):
+    """A scene with an obstacle."""
+    return GOOD + "[[obstacles]]\n" + _lines({"shape": shape, **keys})
+
+
+def moving(**keys):
+    """A scene with a cube that moves."""
+    return obstacle(motion="{ " + ", ".join(f"{key} = {value}" for key, value in keys.items()) + " }")
+
+
+BALL_IN = poses("{ position = [0.3, 0, 0] }") + '[[obstacles]]\nshape = "cube"\nsize = 0.5\n'
 NARROW = "lower = [0, 0, 0], upper = [0.1, 1, 1]"
 ROUND = 'lower = [-0.5, -0.5, -0.5], upper = [0.5, 0.5, 0.5], form = "ellipsoid"'
 
 BROKEN = [
+    (obstacle('"plan"'), "obstacles[0].shape = \"plan\": unknown kind; did you mean 'plane'?"),
+    (
+        obstacle('{ kind = "plane", normal = [0, 0, 0] }'),
+        "obstacles[0].shape.normal = [0, 0, 0]: must not be zero",
+    ),
+    (obstacle(opacity="2"), "obstacles[0].opacity = 2: must be a number from 0 to 1"),
+    (obstacle(name='"walls"'), 'obstacles[0].name = "walls": the walls have this name already'),
+    (obstacle(friction="-1"), "obstacles[0].friction = -1: must be a number of 0 or more"),
+    (obstacle('{ kind = "mesh", file = "no.stl" }'), 'obstacles[0].shape.file = "no.stl": no such file'),
+    (obstacle(surface_velocity="1"), f"obstacles[0].surface_velocity = 1: {VECTOR}"),
+    (moving(kind='"spinn"', rate=1), "obstacles[0].motion.kind = \"spinn\": unknown kind; did you mean 'spin'?"),
+    (moving(kind='"spin"', rate=1, axis="[0, 0, 0]"), "obstacles[0].motion.axis = [0, 0, 0]: must not be zero"),
+    (moving(kind='"vibrate"', amplitude=1), "obstacles[0].motion: the key 'frequency' is missing"),
+    (moving(kind='"keys"', keys="[]"), "obstacles[0].motion.keys = []: must not be empty"),
+    (
+        moving(kind='"keys"', keys="[{ time = 1 }, { time = 1 }]"),
+        "obstacles[0].motion.keys: times must grow from key to key, but 1 follows 1",
+    ),
+    (
+        moving(kind='"translate"', velocity="[1, 0, 0]", frm=3),
+        "obstacles[0].motion.frm = 3: unknown key; did you mean 'from'?",
+    ),
+    (
+        moving(kind='"translate"', velocity="[1, 0, 0]", **{"from": 3, "until": 2}),
+        "obstacles[0].motion: until must be after from, but 2 is not after 3",
+    ),
+    (
+        BALL_IN,
+        "particles[0].placement.poses[0].position = [0.3, 0.0, 0.0]: starts 0.05 m inside obstacles[0]",
+    ),
+    (
+        BALL_IN + 'name = "post"\n',
+        "particles[0].placement.poses[0].position = [0.3, 0.0, 0.0]: starts 0.05 m inside obstacles[0] (post)",
+    ),
     ("", "the file is empty"),
     ("[world\n", "not valid TOML: Expected ']' at the end of a table declaration (at line 1, column 7)"),
     ("a = " + "[" * 5000, "not valid TOML: brackets within brackets without end"),
@@ -125,7 +170,7 @@ BROKEN = [
     (
         group(shape="{ edges = [1, 2, 3] }"),
         "particles[0].shape: the key 'kind' is missing; "
-        "allowed: 'sphere', 'capsule', 'cube', 'tetrahedron', 'box', 'pyramid' or 'mesh'",
+        "allowed: 'sphere', 'capsule', 'cylinder', 'cone', 'cube', 'tetrahedron', 'box', 'pyramid' or 'mesh'",
     ),
     (
         group(shape="3"),
@@ -184,9 +229,12 @@ BROKEN = [
     (contact(between='"a"'), f'contact[0].between = "a": {TWO}'),
     (
         contact(between='["a", "wall"]'),
-        'contact[0].between = ["a", "wall"]: no group has the name "wall"; did you mean \'walls\'?',
+        'contact[0].between = ["a", "wall"]: no group or obstacle has the name "wall"; did you mean \'walls\'?',
     ),
-    (contact(between='["walls", "walls"]'), 'contact[0].between = ["walls", "walls"]: walls do not touch each other'),
+    (
+        contact(between='["walls", "walls"]'),
+        'contact[0].between = ["walls", "walls"]: walls and obstacles do not touch each other',
+    ),
     (
         contact(between='["a", "b"]') + _contact(between='["b", "a"]'),
         'contact[1].between = ["b", "a"]: contact[0] is between these two already',

@@ -13,7 +13,7 @@ from particlesim.rendering.hud.history import History
 from particlesim.rendering.hud.readout import readout_rows
 from particlesim.rendering.look import look_of
 from particlesim.setup.build import build
-from particlesim.setup.obstacles import Obstacle
+from particlesim.setup.obstacles import Obstacle, Piece
 from particlesim.simulation.simulation import Simulation
 from particlesim.trajectory.gsd_file import Trajectory, TrajectoryWriter
 from tests.gases import spheres
@@ -114,9 +114,9 @@ def test_what_meets_at_once_shares_what_is_lost():
 def test_a_moving_wall_drags_what_strikes_it():
     """A belt that runs along x at u: a ball that falls on it takes 2/7 of its speed if it sticks, mu (1 + e) v else."""
     for friction, expected in ((5.0, 2.0 / 7.0 * 3.0), (0.1, 0.1 * 1.5 * 2.0)):
-        belt = Obstacle(
-            half_space((0.0, 0.0, 1.0)), (0, 0, -2), velocity=(3.0, 0, 0), material=Material(0.5, friction=friction)
-        )
+        running = Piece(0.0, (0, 0, -2), velocity=(3.0, 0, 0))
+        surface = Material(0.5, friction=friction)
+        belt = Obstacle(half_space((0.0, 0.0, 1.0)), running.origin, material=surface, pieces=(running,))
         falling = scene(
             listed("sphere", {"position": (0, 0, 0), "velocity": (0, 0, -2)}), boundary="open", friction=9.0
         )

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from particlesim.geometry.shapes import CATALOGUE, half_space
 from particlesim.model.materials import Material
 from particlesim.setup.build import build
-from particlesim.setup.obstacles import Obstacle
+from particlesim.setup.obstacles import Obstacle, Piece
 from particlesim.simulation.simulation import Simulation
 from tests.worlds import gas, listed, scene
 
@@ -18,12 +18,17 @@ def obstructed(what, *obstacles, **options):
     return Simulation.of_model(what, build(what, obstacles), **options)
 
 
+def moving(shape, position, orientation=(1.0, 0.0, 0.0, 0.0), **motion):
+    """An obstacle on a path of one piece."""
+    return Obstacle(shape, position, orientation, pieces=(Piece(0.0, position, orientation, **motion),))
+
+
 @pytest.mark.parametrize("step", [0.01, 0.3, 2.0])
 @pytest.mark.parametrize("shape", ["sphere", "cube"])
 def test_a_ball_and_a_moving_wall(shape, step):
     """A wall at speed u that meets a body at speed v sends it off at 2 u - v; it does not see the time step."""
     ball = listed(shape, {"position": (0, 0, 0), "velocity": (-3, 0, 0)})
-    wall = Obstacle(half_space((1.0, 0.0, 0.0)), (-4.0, 0.0, 0.0), velocity=(2.0, 0.0, 0.0))
+    wall = moving(half_space((1.0, 0.0, 0.0)), (-4.0, 0.0, 0.0), velocity=(2.0, 0.0, 0.0))
     sim = obstructed(scene(ball, boundary="open", step=step), wall)
     sim.run(duration=2.0)
     met = (4.0 - 0.5) / (3.0 + 2.0)
@@ -38,7 +43,7 @@ def test_a_ball_and_a_wall_that_swings(step):
     """x = A sin(w t): the first touch is the first root of a transcendental equation."""
     amplitude, frequency = 0.3, 7.0
     ball = listed("sphere", {"position": (2.0, 0, 0), "velocity": (-1.5, 0, 0)})
-    wall = Obstacle(half_space((1.0, 0.0, 0.0)), (0, 0, 0), amplitude=(amplitude, 0, 0), angular_frequency=frequency)
+    wall = moving(half_space((1.0, 0.0, 0.0)), (0, 0, 0), amplitude=(amplitude, 0, 0), angular_frequency=frequency)
 
     def gap(t):
         return 2.0 - 1.5 * t - 0.5 - amplitude * math.sin(frequency * t)
@@ -68,7 +73,7 @@ def test_a_ball_and_a_paddle_that_turns(step, boundary):
     paddle = CATALOGUE["box"]((6.0, 2 * thick, 1.0))
     # It starts 0.6 rad short of pointing at the ball, and turns towards it.
     start = -0.6
-    blade = Obstacle(
+    blade = moving(
         paddle,
         (0, 0, 0),
         orientation=(math.cos(start / 2), 0.0, 0.0, math.sin(start / 2)),
@@ -92,7 +97,7 @@ def test_a_floor_that_tips_over_meets_a_ball(step):
     omega, distance, radius = 2.0, 3.0, 0.5
     ball = listed("sphere", {"position": (distance, 0, 3.0)})
     start = -0.2
-    floor = Obstacle(
+    floor = moving(
         half_space((0.0, 0.0, 1.0)),
         (0, 0, 0),
         orientation=(math.cos(start / 2), 0.0, -math.sin(start / 2), 0.0),
@@ -130,7 +135,7 @@ def test_the_result_does_not_depend_on_broad_phase_or_threads_with_moving_obstac
     for method, threads in [("octree", 1), ("grid", 2), ("naive", 4)]:
         # Short enough that nothing is wedged between it and the walls.
         paddle = CATALOGUE["box"]((1.2, 0.2, 0.4))
-        blade = Obstacle(paddle, (0, 0, -1.6), velocity=(0, 0, 1.0), angular_velocity=(0, 0, 8.0))
+        blade = moving(paddle, (0, 0, -1.6), velocity=(0, 0, 1.0), angular_velocity=(0, 0, 8.0))
         sim = obstructed(gas(15), blade, broad_phase=method, threads=threads)
         sim.run(duration=1.5)
         hashes.add(sim.state_hash())

@@ -295,6 +295,6 @@ def test_all_shapes_of_the_catalogue_are_drawn():
     assert any(kind.kind == SPHERE for kind in kinds)
     scene = make_scene(*["by_shape"] * len(kinds))
     places = [(0.0, y, 0.0) for y in np.linspace(-3.4, 3.4, len(kinds))]
-    mask = covered(draw(scene, kinds, [1.0] * len(kinds), make_frame(places)))
+    mask = covered(draw(scene, kinds, [0.6] * len(kinds), make_frame(places)))
     runs = np.count_nonzero(np.diff(mask.any(axis=0).astype(int)) == 1)
     assert runs == len(kinds)

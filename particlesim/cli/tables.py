@@ -97,9 +97,12 @@ def print_summary(summary: Summary, path: Path) -> None:
         ("impacts", f"{summary.impacts:,}"),
         ("worst energy change", f"{summary.worst_energy_drift:.1e} of all of it"),
         *((f"lost by {cause}", f"{share:.3g} of all of it") for cause, share in summary.dissipated.items() if share),
-        ("momentum not accounted for", f"{summary.momentum_error:.1e}"),
-        ("largest overlap", f"{summary.largest_overlap:.1e} m"),
     ]
+    if summary.work:
+        rows.append(("worked by obstacles", f"{summary.work:.3g} of all of it"))
+    if not summary.obstructed:
+        rows.append(("momentum not accounted for", f"{summary.momentum_error:.1e}"))
+    rows.append(("largest overlap", f"{summary.largest_overlap:.1e} m"))
     if summary.unresolved:
         rows.append(("steps with impacts left over", summary.unresolved))
     rows += [(name, f"{seconds:.1f} s") for name, seconds in summary.seconds.items()]

@@ -19,7 +19,7 @@ import numpy as np
 from particlesim.core.parallel import ThreadTeam
 from particlesim.dynamics.advance import advance, sum_speeds, time_within_skins
 from particlesim.dynamics.ccd.swept_bounds import BOUND
-from particlesim.dynamics.contact.booking import IMPACTS, LOST, SHEAR, VIRIAL, WALLS, columns_needed
+from particlesim.dynamics.contact.booking import IMPACTS, LOST, SHEAR, VIRIAL, WALLS, WORK, columns_needed
 from particlesim.dynamics.contact.resting import Borne, RestingContacts, forget_clearance
 from particlesim.dynamics.events.collision_prediction import Predicted, bound_paths, predict, predict_across
 from particlesim.dynamics.events.event_queue import run_islands
@@ -50,7 +50,7 @@ from particlesim.dynamics.settings import (
     SUM_BLOCK,
 )
 from particlesim.dynamics.solver_state import FORCE, SEEN, Counts, SolverState
-from particlesim.model.prescribed_motion import place_kinematic
+from particlesim.model.prescribed_motion import changes_within, place_kinematic
 from particlesim.model.system import Model, System
 
 # What the computing time goes into.
@@ -166,7 +166,27 @@ class Solver:
         return _time_for(self._periodic_room, fastest, float(np.linalg.norm(self._system.domain[0]["gravity"])))
 
     def step(self, duration: float) -> None:
+        """Move all bodies on by ``duration`` [s], from one change of an obstacle's motion to the next."""
+        begin = self.state.time
+        if len(self._system.motion):
+            self._place_obstacles()
+        for change in changes_within(self._system.motion, begin, begin + duration):
+            self._go_on(change - self.state.time)
+            self.state.time = change
+            self._place_obstacles()
+        self._go_on(duration - (self.state.time - begin))
+
+    def _place_obstacles(self) -> None:
+        """Let obstacles move as they do from now on."""
+        state, system = self.state, self._system
+        place_kinematic(system.body[system.particles :], system.motion, state.time)
+        still = time_within_skins(system, state.neighbours.reference, system.particles, system.bounded)
+        state.time_within_skins = min(state.time_within_skins, still)
+
+    def _go_on(self, duration: float) -> None:
         """Move all bodies on by ``duration`` [s], in as many equal substeps as that is long."""
+        if duration <= 0.0:
+            return
         parts = max(1, math.ceil(duration / self.longest_substep(MAX_SUBSTEP_DISPLACEMENT) - 1e-9))
         for _ in range(parts):
             self._substep(duration / parts)
@@ -336,9 +356,10 @@ class Solver:
         counts.each[disturbed] += self._clock["impacts"][disturbed]
         counts.impacts += int(total[IMPACTS])
         counts.virial += float(total[VIRIAL]) + borne.virial
-        columns = slice(WALLS, LOST), slice(LOST, SHEAR), slice(SHEAR, None)
+        columns = slice(WALLS, LOST), slice(LOST, SHEAR), slice(SHEAR, WORK)
         for sums, place in zip((counts.wall_impulse, counts.dissipated, counts.wall_shear), columns, strict=True):
             sums.flat[: len(total[place])] += total[place]
+        counts.work += float(total[WORK:].sum())
         counts.wall_impulse += borne.wall_impulse
         counts.unresolved += unfinished > 0 or borne.unresolved
 

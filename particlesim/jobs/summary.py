@@ -15,12 +15,12 @@ class Summary:
     """Gathers frames as they pass: ``add`` each, then read the attributes.
 
     Energies are compared with what there was at first, or with the largest kinetic energy seen if that is more.
-    ``elastic`` says that no impact may take energy.
+    ``elastic`` says that no impact may take energy, ``obstructed`` that there are obstacles.
     """
 
-    def __init__(self, total_mass: float, gravity: Any, elastic: bool = True) -> None:
+    def __init__(self, total_mass: float, gravity: Any, elastic: bool = True, obstructed: bool = False) -> None:
         self._mass, self._gravity = total_mass, tuple(gravity)
-        self.elastic = elastic
+        self.elastic, self.obstructed = elastic, obstructed
         self._first: Ledger | None = None
         self._last: Ledger | None = None
         self._largest_kinetic = self._largest_change = self._largest_gain = 0.0
@@ -49,9 +49,9 @@ class Summary:
         self._last = ledger
         self.largest_overlap = max(self.largest_overlap, ledger.largest_overlap or 0.0)
         self._largest_kinetic = max(self._largest_kinetic, ledger.kinetic)
-        self._largest_change = max(self._largest_change, abs(ledger.energy - self._first.energy))
-        self._least = min(self._least, ledger.energy)
-        self._largest_gain = max(self._largest_gain, ledger.energy - self._least)
+        self._largest_change = max(self._largest_change, abs(ledger.own_energy - self._first.own_energy))
+        self._least = min(self._least, ledger.own_energy)
+        self._largest_gain = max(self._largest_gain, ledger.own_energy - self._least)
 
     @property
     def simulated_seconds(self) -> float:
@@ -70,7 +70,10 @@ class Summary:
 
     @property
     def worst_energy_drift(self) -> float:
-        """Largest change of the total energy since the first frame, as a fraction of it."""
+        """Largest change of the total energy since the first frame, as a fraction of it.
+
+        What moving obstacles worked is not counted.
+        """
         return self._of_all(self._largest_change)
 
     @property
@@ -89,13 +92,21 @@ class Summary:
         taken = self._last.dissipated - self._first.dissipated
         return {cause: self._of_all(float(energy)) for cause, energy in zip(DISSIPATION, taken, strict=True)}
 
+    @property
+    def work(self) -> float:
+        """What moving obstacles gave up to the last frame, as a fraction of all energy."""
+        return self._of_all(self._last.work or 0.0) if self._last else 0.0
+
     def _of_all(self, energy: float) -> float:
         scale = max(self._largest_kinetic, self._first.energy if self._first else 0.0)
         return energy / scale if scale else 0.0
 
     @property
     def momentum_error(self) -> float:
-        """Change of momentum that neither walls nor gravity account for, over the momentum of the fastest motion."""
+        """Change of momentum that neither walls nor gravity account for, over the momentum of the fastest motion.
+
+        Obstacles take some as well, which is not counted.
+        """
         if not (self._first and self._last and self._largest_kinetic):
             return 0.0
         first, last = self._first, self._last

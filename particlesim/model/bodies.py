@@ -47,7 +47,9 @@ BODY = record(
         ("image", "i4", (3,)),  # how often it left a periodic domain by its upper faces
         ("wall", "i4"),  # which wall of the domain it is, in the order of WALL_NAMES; -1 if none
         ("motion", "i4"),  # row of the prescribed motions; -1 if none
-        ("reserved", "i4", (3,)),  # to the end of the cache line: room for what comes next
+        ("id", "i4"),  # of a particle: its place among all that there ever are; -1 of obstacles
+        ("entry", "i4"),  # of an obstacle: its place among those of the scene; -1 of particles and walls
+        ("reserved", "i4"),  # to the end of the cache line: room for what comes next
     ]
 )
 
@@ -108,7 +110,8 @@ def make_particles(
     bodies["isotropic_inertia"] = _isotropic(bodies["principal_inertia"])
     bodies["radius"] = np.array([s.radius for s in shapes])[shape] * size
     bodies["inradius"] = np.array([s.inradius for s in shapes])[shape] * size
-    bodies["wall"] = bodies["motion"] = -1
+    bodies["wall"] = bodies["motion"] = bodies["entry"] = -1
+    bodies["id"] = np.arange(len(bodies))
     return bodies
 
 
@@ -119,7 +122,7 @@ def make_obstacles(count: int) -> np.ndarray:
     bodies["scale"] = bodies["principal_inertia"] = bodies["isotropic_inertia"] = 1.0
     bodies["mass"] = bodies["radius"] = bodies["inradius"] = np.inf
     bodies["kind"] = STATIC
-    bodies["group"] = bodies["wall"] = bodies["motion"] = -1
+    bodies["group"] = bodies["wall"] = bodies["motion"] = bodies["id"] = bodies["entry"] = -1
     return bodies
 
 

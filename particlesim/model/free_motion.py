@@ -26,7 +26,7 @@ from particlesim.core.math3d import (
 )
 from particlesim.core.quadrature import STAGES, WEIGHTS
 from particlesim.model.bodies import DYNAMIC, EQUAL_MOMENTS, KINEMATIC, angular_velocity
-from particlesim.model.prescribed_motion import NO_SWING, swing_shift
+from particlesim.model.prescribed_motion import NO_SWING, swing_of, swing_shift
 
 # An asymmetric body turns by at most this angle [rad] in one stage of the quadrature, whose error falls as its
 # seventh power: about 1e-13 rad.
@@ -177,8 +177,7 @@ def path_of_body(system, i):
     b = system.body[i]
     swing = NO_SWING
     if b.kind == KINEMATIC:
-        m = system.motion[b.motion]
-        swing = to_vec3(m.amplitude), m.angular_frequency, m.angle
+        swing = swing_of(system.motion[b.motion])
     return (
         to_vec3(b.position),
         to_quat(b.orientation),
@@ -207,8 +206,8 @@ def advance_path(path, principal_inertia, time):
     if time == 0.0:
         return path
     position, orientation, velocity = place_on_path(path, principal_inertia, time)
-    amplitude, frequency, angle = path[5]
-    return position, orientation, velocity, path[3], path[4], (amplitude, frequency, angle + frequency * time)
+    amplitude, frequency, angle, across = path[5]
+    return position, orientation, velocity, path[3], path[4], (amplitude, frequency, angle + frequency * time, across)
 
 
 @kernel

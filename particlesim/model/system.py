@@ -33,6 +33,7 @@ class Model(NamedTuple):
     shapes: tuple[Shape, ...]  # of the rows of the shape table, but for the half-spaces of walls
     restitution: np.ndarray  # (m,) of each material
     system: System
+    obstacle_shapes: tuple[Shape, ...] = ()  # that the scene's obstacles are drawn as, in their order
 
     @property
     def particles(self) -> np.ndarray:

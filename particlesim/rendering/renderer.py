@@ -13,18 +13,18 @@ from particlesim.rendering.hud.overlay import Overlay
 from particlesim.rendering.look import Look
 from particlesim.rendering.octree_cells import cell_lines, octree_cells
 from particlesim.rendering.quality import PRESETS
+from particlesim.rendering.scenery import Scenery
 from particlesim.rendering.shading.ambient_occlusion import AmbientOcclusion
 from particlesim.rendering.shading.environment import Environment
 from particlesim.rendering.shading.floor import FloorOcclusion
 from particlesim.rendering.shading.fxaa import fxaa
-from particlesim.rendering.shading.lighting import key_light
+from particlesim.rendering.shading.lighting import Lighting, key_light
 from particlesim.rendering.shading.shade import Paint, Seen, seen_instances, shade
 from particlesim.rendering.shading.shadow import shadow_map
-from particlesim.rendering.visibility.geometry_tables import geometry_tables
 from particlesim.rendering.visibility.instances import Instances, instances_of
 from particlesim.rendering.visibility.occlusion_clusters import occlusion_clusters
 from particlesim.rendering.visibility.projection import Projection
-from particlesim.rendering.visibility.rasterise import rasterise
+from particlesim.rendering.visibility.rasterise import VisibilityBuffer, rasterise
 from particlesim.trajectory.frames import Frame
 
 # Widths of lines [pixels] in a picture 720 pixels high: the edges of the world, and those of the octree's cells.
@@ -48,7 +48,8 @@ class Renderer:
         self._environment = environment = Environment(scene)
         self._camera = Camera(scene, self._size[0] / self._size[1], look.subject, look.window)
         self._overlay = Overlay(look, environment.dark)
-        self._tables = tables = geometry_tables(look.header)
+        self._scenery = Scenery(scene, look.header)
+        tables = self._scenery.tables
         usual = float(np.median(tables.radius)) if len(tables.radius) else 0.0
         self._light = key_light(scene, round(quality.shadow * self._size[1]), usual)
         self._ambient_occlusion = (
@@ -86,16 +87,19 @@ class Renderer:
         (height, width, 3) uint8, sRGB.
         """
         view = self._camera.view(frame.time)
-        instances = instances_of(self._look.scene, self._look.header, frame, self._tables)
+        particles = instances_of(self._look.scene, self._look.header, frame, self._scenery.tables)
+        instances = self._scenery.amid(particles, frame.time)
         clusters = occlusion_clusters(instances.position, instances.tables.radius)
         projection = self._projection(view)
         buffer = rasterise(projection, instances, clusters)
         shadow = shadow_map(rasterise(self._light.projection, instances, clusters).inverse_depth)
-        paint = self._paint(view, frame, instances, seen_instances(buffer, len(instances.position)))
+        paint = self._paint(view, frame, (particles, instances), seen_instances(buffer, len(instances.position)))
         self._put_lines(view, frame)
         lighting = self._light.in_view(projection, shadow)
-        ground = self._environment.ground(self._floor_light(instances))
+        ground = self._environment.ground(self._floor_light(particles))
         colours = shade(projection, buffer, instances, paint, lighting, ground)
+        if len(self._scenery.clear):
+            colours = self._behind_panes(colours, buffer, view, frame.time, lighting)
         # The floor, which is seen from above only, hides no line: those on it would be dashes.
         depth = np.maximum(buffer.inverse_depth, 0.0)
         depth *= np.float32(-view.near)
@@ -111,12 +115,32 @@ class Renderer:
         axes = view.pose[:3, :3].T * np.array([[1.0], [1.0], [-1.0]])
         return Projection(axes, view.pose[:3, 3], False, 0.5 * self._drawn_size[1] / slope, self._drawn_size)
 
-    def _paint(self, view: View, frame: Frame, instances: Instances, seen: Seen) -> Paint:
-        """What the instances that are seen are coloured with."""
+    def _behind_panes(
+        self, colours: np.ndarray, buffer: VisibilityBuffer, view: View, time: float, lighting: Lighting
+    ) -> np.ndarray:
+        """The picture with the obstacles that one sees through before it; they cast no shadows."""
+        scenery, projection = self._scenery, self._projection(view)
+        panes = scenery.instances(scenery.clear, time)
+        seen = rasterise(projection, panes, occlusion_clusters(panes.position, panes.tables.radius))
+        which = seen_instances(seen, len(scenery.clear))
+        light = np.ones((len(which.indices), 1))
+        colour = np.hstack([scenery.colours(panes.bodies(which.indices)), light])
+        paint = Paint(which, colour, self._environment.haze(view))
+        nothing = self._environment.ground(np.zeros((0, 0), dtype=np.float32))
+        lit = shade(projection, seen, panes, paint, lighting, nothing)
+        return scenery.seen_through(colours, buffer.inverse_depth, seen, lit)
+
+    def _paint(self, view: View, frame: Frame, shown: tuple[Instances, Instances], seen: Seen) -> Paint:
+        """What those that are seen of the particles, and of these and obstacles, are coloured with."""
+        particles, instances = shown
+        of_particles = seen.indices < len(particles.position)
+        indices = seen.indices[of_particles]
         light = np.ones(len(seen.indices))
         if self._ambient_occlusion is not None:
-            light = self._ambient_occlusion.light(instances.position, seen.indices, instances.source)
-        colours = self._look.colours(frame, instances.bodies(seen.indices))
+            light[of_particles] = self._ambient_occlusion.light(particles.position, indices, particles.source)
+        colours = np.empty((len(light), 3))
+        colours[of_particles] = self._look.colours(frame, particles.bodies(indices))
+        colours[~of_particles] = self._scenery.colours(instances.bodies(seen.indices[~of_particles]))
         return Paint(seen, np.column_stack([colours, light]).astype(np.float64), self._environment.haze(view))
 
     def _floor_light(self, instances: Instances) -> np.ndarray:

@@ -15,6 +15,7 @@ from particlesim.scene.camera import Camera, FixedCamera, Movie, Show
 from particlesim.scene.errors import SceneError
 from particlesim.scene.groups import Group
 from particlesim.scene.messages import hint, must_be, shown
+from particlesim.scene.obstacles import Obstacle
 from particlesim.scene.surface import WALLS, Contact
 from particlesim.scene.validation_errors import explain
 from particlesim.scene.world import Solver, World
@@ -31,6 +32,7 @@ class Scene(Model):
     duration: Annotated[PlainFloat, Field(gt=0, le=1e9), must_be("a number of seconds above 0, up to 1e9")] = 10.0
     world: World
     particles: Annotated[list[Group], Field(min_length=1)]
+    obstacles: list[Obstacle] = Field(default_factory=list)
     contact: list[Contact] = Field(default_factory=list)
     solver: Solver = Field(default_factory=Solver)
     movie: Movie = Field(default_factory=Movie)
@@ -54,25 +56,26 @@ class Scene(Model):
     @model_validator(mode="after")
     def _names_tell_groups_apart(self) -> Scene:
         known = {WALLS: "the walls have"}
-        for g, group in enumerate(self.particles):
-            if group.name in known:
-                raise ValueError(f"particles[{g}].name = {shown(group.name)}: {known[group.name]} this name already")
-            if group.name is not None:
-                known[group.name] = f"particles[{g}] has"
+        for key, entry in self._entries:
+            if entry.name in known:
+                raise ValueError(f"{key}.name = {shown(entry.name)}: {known[entry.name]} this name already")
+            if entry.name is not None:
+                known[entry.name] = f"{key} has"
         return self
 
     @model_validator(mode="after")
     def _contacts_are_between_groups(self) -> Scene:
-        names = [WALLS, *(group.name for group in self.particles if group.name is not None)]
+        names = [WALLS, *(entry.name for _, entry in self._entries if entry.name is not None)]
+        fixed = {WALLS, *(obstacle.name for obstacle in self.obstacles)}
         before: dict[frozenset[str], int] = {}
         for c, contact in enumerate(self.contact):
             where = f"contact[{c}].between = {shown(contact.between)}"
             for name in contact.between:
                 if name not in names:
-                    raise ValueError(f"{where}: no group has the name {shown(name)}{hint(name, names)}")
+                    raise ValueError(f"{where}: no group or obstacle has the name {shown(name)}{hint(name, names)}")
             pair = frozenset(contact.between)
-            if pair == {WALLS}:
-                raise ValueError(f"{where}: walls do not touch each other")
+            if pair <= fixed:
+                raise ValueError(f"{where}: walls and obstacles do not touch each other")
             if before.setdefault(pair, c) != c:
                 raise ValueError(f"{where}: contact[{before[pair]}] is between these two already")
         return self
@@ -82,6 +85,13 @@ class Scene(Model):
         if self.number > MAX_COUNT:
             raise ValueError(f"{self.number:,} particles in all; there may be up to {MAX_COUNT:,}")
         return self
+
+    @property
+    def _entries(self) -> list[tuple[str, Group | Obstacle]]:
+        """All that may have a name, with their keys."""
+        groups = ((f"particles[{g}]", group) for g, group in enumerate(self.particles))
+        obstacles = ((f"obstacles[{k}]", obstacle) for k, obstacle in enumerate(self.obstacles))
+        return [*groups, *obstacles]
 
     @property
     def number(self) -> int:

@@ -68,6 +68,22 @@ class PolyhedronShape(Model):
     rounding: Rounding = 0.0
 
 
+class CylinderShape(Model):
+    """A cylinder of diameter 1 and the given length, along z, times the size; a prism of 64 sides."""
+
+    kind: Literal["cylinder"]
+    length: Positive = 1.0
+    rounding: Rounding = 0.0
+
+
+class ConeShape(Model):
+    """A cone on a base of diameter 1 and with the given height, along z, times the size; of 64 sides."""
+
+    kind: Literal["cone"]
+    height: Positive = 1.0
+    rounding: Rounding = 0.0
+
+
 class BoxShape(Model):
     """A box with the given edges, times the size."""
 
@@ -98,14 +114,13 @@ class MeshShape(Model):
     rounding: Rounding = 0.0
 
 
-_Shapes = Annotated[
-    SphereShape | CapsuleShape | PolyhedronShape | BoxShape | PyramidShape | MeshShape, Field(discriminator="kind")
-]
+Shapes = SphereShape | CapsuleShape | CylinderShape | ConeShape | PolyhedronShape | BoxShape | PyramidShape | MeshShape
+_Shapes = Annotated[Shapes, Field(discriminator="kind")]
 AnyShape = Annotated[
     _Shapes,
     shorthand(
         'a shape such as "sphere", or a table such as { kind = "box", edges = [1, 2, 3] }',
-        _Shapes | Literal["sphere", "pyramid"] | _PolyhedronName,
+        _Shapes | Literal["sphere", "cylinder", "cone", "pyramid"] | _PolyhedronName,
     ),
 ]
 
@@ -190,7 +205,7 @@ class ClusterPlacement(Model):
         return self
 
 
-def _not_zero(value: tuple[float, ...]) -> tuple[float, ...]:
+def not_zero(value: tuple[float, ...]) -> tuple[float, ...]:
     if not any(value):
         raise ValueError("must not be zero")
     return value
@@ -199,12 +214,12 @@ def _not_zero(value: tuple[float, ...]) -> tuple[float, ...]:
 class Turn(Model):
     """A rotation by ``angle`` [degrees] about ``axis``."""
 
-    axis: Annotated[Vector, AfterValidator(_not_zero)]
+    axis: Annotated[Vector, AfterValidator(not_zero)]
     angle: Finite
 
 
 _HOW_TURNED = "[w, x, y, z] (a quaternion), or { axis = [x, y, z], angle = degrees }"
-Quaternion = Annotated[tuple[Number, Number, Number, Number], must_be(_HOW_TURNED), AfterValidator(_not_zero)]
+Quaternion = Annotated[tuple[Number, Number, Number, Number], must_be(_HOW_TURNED), AfterValidator(not_zero)]
 
 
 def _known_word(value: str) -> str:

@@ -13,7 +13,9 @@ from particlesim.scene.messages import must_be
 WALLS = "walls"
 
 TangentialRestitution = Annotated[PlainFloat, Field(ge=-1, le=1), must_be("a number from -1 to 1")]
-Two = Annotated[tuple[Text, Text], must_be(f"the names of two groups, or of one and '{WALLS}', such as ['a', 'b']")]
+Two = Annotated[
+    tuple[Text, Text], must_be(f"the names of two groups, or of one and an obstacle or '{WALLS}', such as ['a', 'b']")
+]
 
 
 class HasSurface(Model):
@@ -45,6 +47,6 @@ class Surface(HasSurface):
 
 
 class Contact(Surface):
-    """What two groups, or the particles of one among themselves, do to each other in place of what they usually do."""
+    """What groups and obstacles, or the particles of one group, do to each other in place of what they usually do."""
 
     between: Two

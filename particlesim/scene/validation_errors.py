@@ -79,7 +79,8 @@ def _find(location: tuple[str | int, ...], table: dict[str, Any], model: type[Ba
     spot = _Spot((), table, (model,))
     for step in location:
         chosen = tuple(model for model in spot.models if step in _kinds_of(model))
-        if chosen:
+        # A kind may be called as one of its keys: it is chosen once.
+        if chosen and chosen != spot.models:
             spot = spot._replace(models=chosen)
         elif isinstance(step, int):
             inside = isinstance(spot.value, list | tuple) and step < len(spot.value)

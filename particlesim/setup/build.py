@@ -11,21 +11,24 @@ import numpy as np
 
 from particlesim.broad_phase import find_pairs
 from particlesim.core.constants import OPEN, PERIODIC, WALL, WALL_NAMES
-from particlesim.core.rotations import quaternions_of, rotations_of
 from particlesim.geometry.shape_table import stack_shapes
-from particlesim.geometry.shapes import CATALOGUE, Shape, half_space
+from particlesim.geometry.shapes import Shape, half_space
 from particlesim.model.bodies import make_particles
 from particlesim.model.domain import make_domain, make_walls, wall_normals
 from particlesim.model.materials import Material, PairLaw, contact_laws
 from particlesim.model.overlap import separation_of, touching_half_spaces, touching_pairs
+from particlesim.model.prescribed_motion import place_kinematic
 from particlesim.model.system import Model, System, make_system
 from particlesim.scene import Scene
 from particlesim.scene.file import SceneError
-from particlesim.scene.groups import FixedSize, Group, ListPlacement, MeshShape, Turn
+from particlesim.scene.groups import FixedSize, Group, ListPlacement
 from particlesim.scene.surface import WALLS
 from particlesim.setup.initial_motion import random_quaternions, set_in_motion
 from particlesim.setup.obstacles import Obstacle, obstruct
+from particlesim.setup.orientations import of_body_axes, quaternion_of
 from particlesim.setup.placement import positions, unit_hint
+from particlesim.setup.scene_obstacles import drawn_shapes, obstacle_materials, obstacles_of
+from particlesim.setup.shape_reading import shape_of
 from particlesim.setup.space import Crowd, Space
 
 # Density of particles that give neither density nor mass: water [kg/m^3].
@@ -34,9 +37,6 @@ _DEFAULT_DENSITY = 1000.0
 # Particles that a list puts into each other deeper than this fraction of their sizes are refused.
 _TOLERATED_OVERLAP = 1e-9
 
-# A body whose inscribed sphere is this much smaller than its bounding one is a sheet.
-_FLATTEST = 1e-6
-
 # Bytes a particle takes: constants, state, boxes, and the broad phase and the candidate pairs at their largest.
 BYTES_PER_PARTICLE = 1000
 
@@ -44,7 +44,10 @@ _BOUNDARIES = {"wall": WALL, "periodic": PERIODIC, "open": OPEN}
 
 
 def build(scene: Scene, obstacles: Sequence[Obstacle] = ()) -> Model:
-    """The model that a simulation of ``scene`` starts from. SceneError if something does not fit or cannot be read."""
+    """The model that a simulation of ``scene``, with more ``obstacles``, starts from.
+
+    SceneError if something does not fit or cannot be read.
+    """
     check_memory(scene.number)
     randoms = [np.random.default_rng([scene.seed, g]) for g in range(len(scene.particles))]
     shapes, shape_of_group = _shapes(scene)
@@ -53,11 +56,15 @@ def build(scene: Scene, obstacles: Sequence[Obstacle] = ()) -> Model:
     _check_sizes(scene, domain[0], particles)
     _check_volume(scene, domain[0], shapes, particles)
     particles["orientation"] = _orientations(scene, shapes, particles, randoms)
-    model = assemble(shapes, particles, domain, materials_of(scene), obstacles, pair_laws_of(scene))
+    own = obstacles_of(scene)
+    model = assemble(shapes, particles, domain, materials_of(scene), [*own, *obstacles], pair_laws_of(scene))
+    model = model._replace(obstacle_shapes=drawn_shapes(scene, own))
     crowd = Crowd(*(np.ascontiguousarray(particles[name]) for name in ("shape_row", "group", "scale", "radius")))
     particles = model.particles
+    place_kinematic(model.system.body, model.system.motion, 0.0)
+    table = model.system.shapes, obstacles_among(model.system)
     particles["position"] = positions(
-        scene, model.system.shapes, space_of(domain), crowd, np.ascontiguousarray(particles["orientation"]), randoms
+        scene, table, space_of(domain), crowd, np.ascontiguousarray(particles["orientation"]), randoms
     )
     set_in_motion(scene, particles, randoms)
     _check_apart(scene, model.system)
@@ -100,13 +107,14 @@ def materials_of(scene: Scene) -> list[Material]:
 
 
 def contact_laws_of(scene: Scene) -> np.ndarray:
-    """The contact laws of a scene's walls and groups, (m, m) CONTACT_LAW."""
-    return contact_laws(materials_of(scene), pair_laws_of(scene))
+    """The contact laws of a scene's walls, groups and obstacles, (m, m) CONTACT_LAW."""
+    return contact_laws([*materials_of(scene), *obstacle_materials(scene)], pair_laws_of(scene))
 
 
 def pair_laws_of(scene: Scene) -> list[PairLaw]:
     """What the scene says of contacts between two of the materials."""
-    row = {WALLS: 0, **{group.name: g for g, group in enumerate(scene.particles, 1) if group.name is not None}}
+    names = [*(group.name for group in scene.particles), *(obstacle.name for obstacle in scene.obstacles)]
+    row = {WALLS: 0, **{name: k for k, name in enumerate(names, 1) if name is not None}}
     between = ((contact.between, contact.surface) for contact in scene.contact)
     return [PairLaw(row[a], row[b], values) for (a, b), values in between]
 
@@ -133,27 +141,13 @@ def _shapes(scene: Scene) -> tuple[list[Shape], list[int]]:
     numbers: dict[str, int] = {}
     of_group = []
     for g, group in enumerate(scene.particles):
-        try:
-            shape = CATALOGUE[group.shape.kind](**group.shape.model_dump(exclude={"kind"}))
-        except (OSError, ValueError) as error:
-            reason = error.strerror if isinstance(error, OSError) else None
-            words = f"cannot be read: {reason}" if reason else str(error)
-            raise _shape_error(g, group, " ".join(words.split())) from None
-        if shape.inradius <= _FLATTEST * shape.radius:
-            raise _shape_error(g, group, "is too flat to be a body")
+        shape = shape_of(group.shape, _key(g, "shape"))
         name = group.shape.model_dump_json()
         if name not in numbers:
             numbers[name] = len(shapes)
             shapes.append(shape)
         of_group.append(numbers[name])
     return shapes, of_group
-
-
-def _shape_error(g: int, group: Group, message: str) -> SceneError:
-    if isinstance(group.shape, MeshShape):
-        file = str(group.shape.file)
-        return SceneError(message.removeprefix(f"{file}: "), _key(g, "shape.file"), file)
-    return SceneError(message, _key(g, "shape"))
 
 
 def _sizes(group: Group, random: np.random.Generator) -> np.ndarray:
@@ -229,22 +223,6 @@ def _check_volume(scene: Scene, domain: np.void, shapes: list[Shape], particles:
         raise SceneError(wrong + max(hints), "particles")
 
 
-def _quaternion(orientation: tuple[float, ...] | Turn | str) -> np.ndarray:
-    """A scene's orientation as a unit quaternion (w, x, y, z); a word stands for the axes of the world."""
-    if isinstance(orientation, str):
-        return np.array([1.0, 0.0, 0.0, 0.0])
-    if isinstance(orientation, Turn):
-        axis = np.array(orientation.axis) / np.linalg.norm(orientation.axis)
-        half = 0.5 * math.radians(orientation.angle)
-        return np.concatenate([[math.cos(half)], math.sin(half) * axis])
-    return np.array(orientation) / np.linalg.norm(orientation)
-
-
-def _turned(q: np.ndarray, into: np.ndarray) -> np.ndarray:
-    """Orientations (k, 4) of the described axes as orientations of the body axes that ``into`` turns into them."""
-    return quaternions_of(rotations_of(q) * rotations_of(into))
-
-
 def _orientations(
     scene: Scene, shapes: list[Shape], particles: np.ndarray, randoms: list[np.random.Generator]
 ) -> np.ndarray:
@@ -253,33 +231,47 @@ def _orientations(
     for g, (group, random) in enumerate(zip(scene.particles, randoms, strict=True)):
         listed = isinstance(group.placement, ListPlacement)
         if isinstance(group.placement, ListPlacement):
-            q = np.array([_quaternion(pose.orientation) for pose in group.placement.poses])
+            q = np.array([quaternion_of(pose.orientation) for pose in group.placement.poses])
         elif group.orientation == "random":
             q = random_quaternions(random, group.number)
         else:
-            q = np.tile(_quaternion(group.orientation), (group.number, 1))
-        frame = shapes[int(particles["shape_row"][particles["group"] == g][0])].orientation if group.number else None
-        if frame is not None and frame[0] != 1.0 and (listed or group.orientation != "random"):
-            q = _turned(q, frame)
+            q = np.tile(quaternion_of(group.orientation), (group.number, 1))
+        if group.number and (listed or group.orientation != "random"):
+            q = of_body_axes(q, shapes[int(particles["shape_row"][particles["group"] == g][0])])
         parts.append(q)
     return np.ascontiguousarray(np.concatenate(parts))
 
 
 def _check_apart(scene: Scene, system: System) -> None:
-    """No particle may start inside another or outside a wall; touching is allowed."""
+    """No particle may start inside another, an obstacle or outside a wall; touching is allowed."""
     bounded = system.body[: system.bounded]
     reach = bounded["radius"][:, None]
     pairs = find_pairs(bounded["position"] - reach, bounded["position"] + reach, period=system.domain[0]["period"])
+    pairs = pairs[pairs[:, 0] < system.particles]
     for contacts in (touching_half_spaces(system), touching_pairs(system, pairs)):
         for i, j in contacts.tolist():
             separation = separation_of(system, i, j)
             if separation < -_TOLERATED_OVERLAP * system.body["radius"][i]:
                 deep = f"{-separation:.3g} m"
-                if j >= system.bounded:
-                    wall = WALL_NAMES[system.body["wall"][j]]
-                    raise _start_error(scene, system.body, i, f"sticks {deep} through the {wall} wall")
+                wall, entry = system.body["wall"][j], system.body["entry"][j]
+                if wall >= 0:
+                    raise _start_error(scene, system.body, i, f"sticks {deep} through the {WALL_NAMES[wall]} wall")
+                if entry >= 0:
+                    raise _start_error(scene, system.body, i, f"starts {deep} inside {_obstacle_name(scene, entry)}")
                 g, k = _place_in_group(system.body, j)
                 raise _start_error(scene, system.body, i, f"starts {deep} inside particle {k} of particles[{g}]")
+
+
+def _obstacle_name(scene: Scene, k: int) -> str:
+    """What to call an obstacle of a scene, or one that was added from Python."""
+    name = scene.obstacles[k].name if k < len(scene.obstacles) else None
+    return f"obstacles[{k}]" if name is None else f"obstacles[{k}] ({name})"
+
+
+def obstacles_among(system: System) -> np.ndarray:
+    """The bodies that are neither particles nor walls, (k,) BODY."""
+    others = system.body[system.particles :]
+    return others[others["wall"] < 0]
 
 
 def _start_error(scene: Scene, body: np.ndarray, i: int, wrong: str) -> SceneError:

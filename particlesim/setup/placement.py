@@ -36,6 +36,10 @@ _FIRST_LOOK = 128
 _PLACED_BY_DOUBLING = 1.0 / 6.0
 
 
+# The shapes that there are, and the obstacles, (k,) BODY.
+Known = tuple[ShapeTable, np.ndarray]
+
+
 def unit_hint(group: Group) -> str:
     """What may be wrong where particles of a group are too large."""
     in_metres = isinstance(group.shape, MeshShape) and group.shape.unit == "m"
@@ -44,7 +48,7 @@ def unit_hint(group: Group) -> str:
 
 def positions(
     scene: Scene,
-    table: ShapeTable,
+    known: Known,
     world: Space,
     crowd: Crowd,
     orientation: np.ndarray,
@@ -52,11 +56,12 @@ def positions(
 ) -> np.ndarray:
     """Positions of all particles of a scene, (n, 3) [m]. SceneError if a group does not fit.
 
-    Lists and lattices come first; the rest is put between them at random, the largest particles first.
+    Lists and lattices come first; the rest is put between them at random, the largest particles first, and not into
+    obstacles.
     """
     insertion = empty_space(crowd, world, orientation)
     position, level = insertion.body["position"], insertion.body["level"]
-    below, above = aabbs_of(table, crowd.shape, crowd.size, orientation)
+    below, above = aabbs_of(known[0], crowd.shape, crowd.size, orientation)
     groups = [np.flatnonzero(crowd.group == g) for g in range(len(scene.particles))]
     for g, (group, members) in enumerate(zip(scene.particles, groups, strict=True)):
         if isinstance(group.placement, ListPlacement):
@@ -75,20 +80,20 @@ def positions(
             refile(insertion, in_place, number)
         for g, trials in inserted.items():
             members = groups[g][level[groups[g]] == number]
-            left = _insert(table, insertion, trials, members)
+            left = _insert(known, insertion, trials, members)
             if left:
                 raise _no_room(g, scene.particles[g], left)
             in_place = np.concatenate([in_place, members])
     return np.ascontiguousarray(position)
 
 
-def _insert(table: ShapeTable, insertion: Insertion, trials: _Trials, left: np.ndarray) -> int:
+def _insert(known: Known, insertion: Insertion, trials: _Trials, left: np.ndarray) -> int:
     """Put the particles of ``left`` (m,) at random between those in place; how many found no room."""
     before, look, tried = len(left), _FIRST_LOOK, 0
     while len(left) and tried < _MAX_TRIALS:
         each = max(_TRIALS_A_CALL // len(left), 1)
         proposals = trials.draw(np.repeat(left, each)).reshape(len(left), each, 3)
-        left = left[~try_in_place(table, insertion, left, proposals)]
+        left = left[~try_in_place(known, insertion, left, proposals)]
         tried += each
         if tried >= look:
             if look > _FIRST_LOOK and len(left) > max(_CROWD, (1.0 - _PLACED_BY_DOUBLING) * before):

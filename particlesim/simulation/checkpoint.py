@@ -20,7 +20,7 @@ from particlesim.model.system import Model, System
 from particlesim.scene import Scene
 from particlesim.scene.file import SceneError, stored_scene
 
-_FORMAT = 2
+_FORMAT = 3
 
 
 class CheckpointError(ValueError):
@@ -46,6 +46,7 @@ def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
         "version": importlib.metadata.version("particlesim"),
         "scene": scene.model_dump_json(),
         "shapes": [_described(shape) for shape in model.shapes],
+        "obstacle_shapes": [_described(shape) for shape in model.obstacle_shapes],
         "particles": system.pop("particles"),
         "bounded": system.pop("bounded"),
         "done": done,
@@ -81,10 +82,11 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
 def _assembled(text: dict[str, Any], arrays: dict[str, np.ndarray]) -> Checkpoint:
     """The checkpoint of what was stored."""
     arrays = {name: as_records(array) for name, array in arrays.items()}
-    shapes = ShapeTable(**_under("shapes.", arrays))
+    table = ShapeTable(**_under("shapes.", arrays))
     arrays["system.body"] = cache_aligned(arrays["system.body"])
-    system = System(shapes, particles=text["particles"], bounded=text["bounded"], **_under("system.", arrays))
-    model = Model(tuple(_shape(described) for described in text["shapes"]), arrays["restitution"], system)
+    system = System(table, particles=text["particles"], bounded=text["bounded"], **_under("system.", arrays))
+    shapes, drawn = (tuple(_shape(each) for each in text[key]) for key in ("shapes", "obstacle_shapes"))
+    model = Model(shapes, arrays["restitution"], system, drawn)
     counted = _under("counts.", arrays)
     counts = Counts(**{f.name: _plain(counted[f.name]) for f in fields(Counts)})
     state = SolverState.of_arrays(_under("state.", arrays))

@@ -206,6 +206,7 @@ class Simulation:
             wall_impulse=counts.wall_impulse.copy(),
             dissipated=counts.dissipated.copy(),
             wall_shear=counts.wall_shear.copy(),
+            work=counts.work,
         )
 
     def largest_overlap(self) -> float:
@@ -229,6 +230,7 @@ class Simulation:
             b["group"].astype(np.int64),
             b["mass"].copy(),
             b["principal_inertia"].copy(),
+            self.model.obstacle_shapes,
         )
 
     def frame(self) -> Frame:

@@ -34,6 +34,7 @@ class Ledger:
     largest_overlap: float | None = None  # of two particles, or of one and a wall [m]; only recorded frames have it
     dissipated: np.ndarray | None = None  # (4,) by the causes in DISSIPATION [J]; older files do not have it
     wall_shear: np.ndarray | None = None  # (6, 3) given to the walls across their normals [N s]; nor this
+    work: float | None = None  # that moving obstacles did in impacts [J]; nor this
 
     @property
     def kinetic(self) -> float:
@@ -50,6 +51,11 @@ class Ledger:
     def energy(self) -> float:
         """Kinetic and potential energy [J]."""
         return self.kinetic + self.potential
+
+    @property
+    def own_energy(self) -> float:
+        """Kinetic and potential energy less what moving obstacles worked [J]."""
+        return self.energy - (self.work or 0.0)
 
 
 def ledger_table(ledger: Ledger) -> dict[str, Any]:
@@ -83,6 +89,8 @@ class Header:
         [kg]
     inertia : (n, 3) float64
         Principal moments [kg m^2].
+    obstacles
+        What each obstacle of the scene is drawn as.
     """
 
     scene_json: str
@@ -92,6 +100,7 @@ class Header:
     group: np.ndarray
     mass: np.ndarray
     inertia: np.ndarray
+    obstacles: tuple[Shape, ...] = ()
 
     @property
     def radius(self) -> np.ndarray:

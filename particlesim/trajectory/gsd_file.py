@@ -21,7 +21,7 @@ import numpy as np
 from particlesim.core.constants import CAPSULE, DISSIPATION, SPHERE, WALL_NAMES
 from particlesim.core.rotations import conjugates, quaternion_products
 from particlesim.geometry.convex_hull import hull_polygons
-from particlesim.geometry.shapes import Shape, capsule, principal_hull, sphere
+from particlesim.geometry.shapes import Shape, capsule, drawn_hull, principal_hull, sphere
 from particlesim.scene import Scene
 from particlesim.scene.file import stored_scene
 from particlesim.trajectory.frames import Frame, Header, Ledger
@@ -253,10 +253,13 @@ def _header_log(header: Header) -> dict[str, np.ndarray]:
         }
         for s in header.shapes
     ]
+    drawn = "name", "vertices", "rounding", "orientation"
+    obstacles = [{name: _plain(getattr(s, name)) for name in drawn} for s in header.obstacles]
     return {
         _LOG + "version": np.frombuffer(importlib.metadata.version("particlesim").encode(), dtype=np.uint8),
         _LOG + "scene": np.frombuffer(header.scene_json.encode(), dtype=np.uint8),
         _LOG + "shapes": np.frombuffer(json.dumps(shapes).encode(), dtype=np.uint8),
+        _LOG + "obstacles": np.frombuffer(json.dumps(obstacles).encode(), dtype=np.uint8),
         _LOG + "shape": header.shape.astype(np.int32),
         _LOG + "size": header.size,
         _LOG + "group": header.group.astype(np.int32),
@@ -276,7 +279,26 @@ def _read_header(chunks: Chunks) -> Header:
         group=chunks.rows(_LOG + "group", len(shape), (0.0,))[:, 0].astype(np.int64),
         mass=chunks.rows("particles/mass", len(shape), (1.0,))[:, 0],
         inertia=chunks.rows("particles/moment_inertia", len(shape), (0.0, 0.0, 0.0)),
+        obstacles=tuple(_read_obstacle(s) for s in _read_obstacles(chunks)),
     )
+
+
+def _read_obstacles(chunks: Chunks) -> list[dict[str, Any]]:
+    """What is said of the obstacles' shapes; nothing in older files."""
+    name = _LOG + "obstacles"
+    found: list[dict[str, Any]] = json.loads(chunks.read(name).tobytes()) if chunks.has(name) else []
+    return found
+
+
+def _read_obstacle(described: dict[str, Any]) -> Shape:
+    """A shape that is only drawn, from its core: a point, a segment or a polyhedron."""
+    if len(described["vertices"]) <= 2:
+        return _read_shape(described)
+    return drawn_hull(**described)
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def _read_shape(described: dict[str, Any]) -> Shape:

@@ -21,7 +21,7 @@ from particlesim.geometry.support import half_space_plane, is_sphere
 from particlesim.model.bodies import KINEMATIC, STATIC, angular_velocity, placed
 from particlesim.model.domain import nearest_image
 from particlesim.model.free_motion import free_acceleration
-from particlesim.model.prescribed_motion import swing_acceleration
+from particlesim.model.prescribed_motion import swing_acceleration, swing_of
 
 BOUND = record(
     [
@@ -48,8 +48,7 @@ def largest_acceleration(system, b):
     """The largest acceleration of a body's position on its present path [m/s^2]."""
     largest = norm(free_acceleration(system, b))
     if b.kind == KINEMATIC:
-        m = system.motion[b.motion]
-        largest += swing_acceleration((to_vec3(m.amplitude), m.angular_frequency, m.angle))
+        largest += swing_acceleration(swing_of(system.motion[b.motion]))
     return largest
 
 

@@ -9,18 +9,21 @@ from particlesim.model.bodies import DYNAMIC
 from particlesim.model.system import System
 
 # Columns: impacts, the virial, the impulse on each wall along its normal, what energy was lost by restitution, friction
-# and rolling friction, and the impulse on each wall across its normal, a vector.
+# and rolling friction, the impulse on each wall across its normal, a vector, and the work of moving obstacles.
 IMPACTS, VIRIAL, WALLS = 0, 1, 2
 LOST = WALLS + len(WALL_NAMES)
 SHEAR = LOST + 3
-_END = SHEAR + 3 * len(WALL_NAMES)
+WORK = SHEAR + 3 * len(WALL_NAMES)
+_END = WORK + 1
 
 
 def columns_needed(system: System) -> int:
     """How many columns there must be: no more than something can be in, for there is a row for each particle."""
+    if len(system.motion):
+        return _END
     bounded = len(system.body) == system.bounded
     if (system.law["friction"] > 0.0).any():
-        return SHEAR if bounded else _END
+        return SHEAR if bounded else WORK
     if (system.law["restitution"] < 1.0).any():
         return SHEAR
     return WALLS if bounded else LOST
@@ -56,3 +59,5 @@ def book_contact(accumulator, b, contact, factor):
     if len(accumulator) > SHEAR:
         shear = to_vec3(contact.shear)
         book_shear(accumulator, b, (factor * shear[0], factor * shear[1], factor * shear[2]), offset)
+    if len(accumulator) > WORK:
+        accumulator[WORK] += factor * contact.work

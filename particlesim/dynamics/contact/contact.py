@@ -19,6 +19,7 @@ CONTACT = record(
         ("impulse", "f8"),  # of the present round, along the normal on b [N s]
         ("shear", "f8", (3,)),  # and across it
         ("lost", "f8", (3,)),  # what of the energy it takes by restitution, friction and rolling friction [J]
+        ("work", "f8"),  # and what it gives, as b moves whatever pushes it [J]
         ("resolved", "i8"),  # whether it has had any impulse
         ("a", "i8"),  # actors
         ("b", "i8"),
@@ -59,6 +60,12 @@ def inverse_mass_at(b, lever_arm, normal):
     """
     lever = cross(lever_arm, normal)
     return per_mass(b, dot(normal, normal)) + dot(lever, angular_velocity_change(b, lever))
+
+
+@kernel
+def work_of_obstacle(b, impulse, turned):
+    """The work that an obstacle does by an impulse [N s] and an angular impulse [N m s] on it, as it goes on [J]."""
+    return -dot(to_vec3(b.velocity), impulse) - dot(angular_velocity(b), turned)
 
 
 @kernel

@@ -17,11 +17,17 @@ from particlesim.core.constants import MAX_MANIFOLD
 from particlesim.core.jit import kernel
 from particlesim.core.math3d import add, axpy, cross, dot, load_vec3, norm, scale, set_vec3, sub, to_vec3
 from particlesim.dynamics.contact.booking import IMPACTS, book_contact
-from particlesim.dynamics.contact.contact import CONTACT, find_contact, inverse_mass_at, normal_velocity_at
-from particlesim.dynamics.contact.law import has_friction, rest_threshold, restitution_of
+from particlesim.dynamics.contact.contact import (
+    CONTACT,
+    find_contact,
+    inverse_mass_at,
+    normal_velocity_at,
+    work_of_obstacle,
+)
+from particlesim.dynamics.contact.law import has_friction, rest_threshold, restitution_of, surface_velocity
 from particlesim.dynamics.contact.rough_impact import rough_impulse
 from particlesim.dynamics.settings import APPROACH_TOLERANCE, MAX_MANIFOLD_IMPULSES
-from particlesim.model.bodies import BODY, DYNAMIC, angular_velocity, angular_velocity_change, per_mass
+from particlesim.model.bodies import BODY, DYNAMIC, KINEMATIC, angular_velocity, angular_velocity_change, per_mass
 
 # What became of contacts: they did not approach; they approached fast; slowly, and rebounded in full until they come to
 # rest; or slowly with both bodies resting, which is left to the next substep.
@@ -153,7 +159,7 @@ def _propose(system, moment, c, leave_slow, friction):
     contact = moment.contact[c]
     a, b = moment.actor[contact.a], moment.actor[contact.b]
     normal, offset = to_vec3(contact.normal), to_vec3(contact.offset)
-    contact.impulse = 0.0
+    contact.impulse = contact.work = 0.0
     point, speed = _point_to_resolve(system.domain[0].rest_speed, a, b, contact, moment.points[c])
     if speed >= 0.0:
         return NOTHING, 0.0
@@ -161,9 +167,16 @@ def _propose(system, moment, c, leave_slow, friction):
     if what == LEFT or (leave_slow and what != STRUCK):
         return NOTHING, 0.0
     if friction is not None and has_friction(system, a, b):
+        own = to_vec3(b.velocity)
+        if b.kind == KINEMATIC:
+            # A conveyor rubs as if it went along with its surface.
+            set_vec3(b.velocity, add(own, surface_velocity(system, b, normal)))
         impulse, turned_a, turned_b, energy = rough_impulse(
             system, a, b, contact, moment.points[c], point, factor - 1.0
         )
+        if b.kind == KINEMATIC:
+            contact.work = work_of_obstacle(b, impulse, turned_b)
+            set_vec3(b.velocity, own)
         _add_push(moment.push[contact.a], scale(impulse, -1.0), turned_a)
         _add_push(moment.push[contact.b], impulse, turned_b)
         return what, energy
@@ -171,6 +184,10 @@ def _propose(system, moment, c, leave_slow, friction):
     contact.impulse = factor * stop
     energy = factor * factor * stop * -speed
     contact.lost[0] = 0.5 * (2.0 / factor - 1.0) * energy
+    if b.kind == KINEMATIC:
+        contact.work = work_of_obstacle(
+            b, scale(normal, contact.impulse), scale(cross(sub(point, offset), normal), contact.impulse)
+        )
     _add_push_at(moment.push[contact.a], -contact.impulse, point, normal)
     _add_push_at(moment.push[contact.b], contact.impulse, sub(point, offset), normal)
     return what, energy

@@ -7,7 +7,7 @@ Friction belongs here: its coefficients are further fields of CONTACT_LAW, and t
 import math
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import cross, norm, scale, to_vec3
+from particlesim.core.math3d import axpy, cross, dot, norm, scale, to_vec3
 from particlesim.dynamics.settings import RESTITUTION_THRESHOLD_HEIGHT
 
 
@@ -21,6 +21,13 @@ def restitution_of(system, a, b):
 def has_friction(system, a, b):
     """Whether two bodies rub against each other where they touch."""
     return system.law[a.material, b.material].friction > 0.0
+
+
+@kernel
+def surface_velocity(system, b, normal):
+    """The velocity of a kinematic body's surface against the body, across a normal: that of a conveyor [m/s]."""
+    running = to_vec3(system.motion[b.motion].surface_velocity)
+    return axpy(running, normal, -dot(running, normal))
 
 
 @kernel

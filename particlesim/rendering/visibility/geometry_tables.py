@@ -46,6 +46,12 @@ def geometry_tables(header: Header) -> GeometryTables:
     return GeometryTables(stack_shapes(header.shapes), body, header.radius, inradius)
 
 
+def joined(some: GeometryTables, more: GeometryTables) -> GeometryTables:
+    """The bodies of two tables that have the same shapes."""
+    body, radius, inradius = (np.concatenate([a, b]) for a, b in zip(some[1:], more[1:], strict=True))
+    return GeometryTables(some.shapes, body, radius, inradius)
+
+
 @kernel
 def drawn_as(shape):
     """Whether a SHAPE row is drawn as a BALL, a FACETED or as ROUNDED."""

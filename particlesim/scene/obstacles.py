@@ -1,0 +1,130 @@
+"""Obstacles: what particles move among, standing or on a path that nothing changes."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, create_model, model_validator
+
+from particlesim.scene.base import (
+    Colour,
+    Finite,
+    Fraction,
+    Model,
+    NotNegative,
+    Positive,
+    Text,
+    Vector,
+    shorthand,
+)
+from particlesim.scene.groups import Orientation, Shapes, not_zero
+from particlesim.scene.surface import Surface
+
+Direction = Annotated[Vector, AfterValidator(not_zero)]
+
+
+class PlaneShape(Model):
+    """All that is behind a plane through the position, without end; the normal points out of it."""
+
+    kind: Literal["plane"]
+    normal: Direction = (0.0, 0.0, 1.0)
+
+
+_ObstacleShapes = Annotated[PlaneShape | Shapes, Field(discriminator="kind")]
+ObstacleShape = Annotated[
+    _ObstacleShapes,
+    shorthand(
+        'a shape such as "sphere", or a table such as { kind = "plane", normal = [0, 0, 1] }',
+        _ObstacleShapes | Literal["plane", "sphere", "cylinder", "cone", "cube", "tetrahedron", "pyramid"],
+    ),
+]
+
+# 'from' is a word of Python, which no class can have for a field.
+_SPAN: dict[str, Any] = {"from": (NotNegative, 0.0), "until": (Positive | None, None)}
+
+
+class Timed(create_model("Span", __base__=Model, **_SPAN)):  # type: ignore[misc]
+    """Goes on from a time until another one [s]; before and after it nothing goes on."""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Timed:
+        if self.until is not None and self.until <= self.begin:
+            raise ValueError(f"until must be after from, but {self.until:g} is not after {self.begin:g}")
+        return self
+
+    @property
+    def begin(self) -> float:
+        """When it begins [s]."""
+        return float(getattr(self, "from"))
+
+
+class SpinMotion(Timed):
+    """Turns about an axis through ``centre`` (the obstacle's position if not given) at ``rate`` [rad/s]."""
+
+    kind: Literal["spin"]
+    axis: Direction = (0.0, 0.0, 1.0)
+    rate: Finite
+    centre: Vector | None = None  # [m]
+
+
+class VibrateMotion(Timed):
+    """Swings by ``amplitude`` [m] to both sides along ``direction``, ``frequency`` times a second."""
+
+    kind: Literal["vibrate"]
+    direction: Direction = (0.0, 0.0, 1.0)
+    amplitude: NotNegative
+    frequency: Positive  # [Hz]
+    phase: Finite = 0.0  # when it begins [degrees]: at 0 in the middle, going ahead
+
+
+class TranslateMotion(Timed):
+    """Goes on at ``velocity`` [m/s]."""
+
+    kind: Literal["translate"]
+    velocity: Vector
+
+
+class MotionKey(Model):
+    """Where an obstacle is at one time."""
+
+    time: NotNegative  # [s]
+    position: Vector | None = None  # [m]; as at the key before if not given, and at first that of the obstacle
+    orientation: Orientation | None = None  # likewise
+
+
+def _in_time(keys: list[MotionKey]) -> list[MotionKey]:
+    for before, after in itertools.pairwise(keys):
+        if after.time <= before.time:
+            raise ValueError(f"times must grow from key to key, but {after.time:g} follows {before.time:g}")
+    return keys
+
+
+class KeysMotion(Model):
+    """From key to key: it sets off gently and arrives gently, and turns evenly. At rest before the first and the last.
+
+    Between two keys it is as far as t - sin(2 pi t) / (2 pi) of the way, t being the part of the time.
+    """
+
+    kind: Literal["keys"]
+    keys: Annotated[list[MotionKey], Field(min_length=1), AfterValidator(_in_time)]
+
+
+Motion = Annotated[SpinMotion | VibrateMotion | TranslateMotion | KeysMotion, Field(discriminator="kind")]
+
+
+class Obstacle(Surface):
+    """A body that nothing can push.
+
+    Like a group's, its surface is as the world says where it does not.
+    """
+
+    name: Text | None = None
+    shape: ObstacleShape
+    size: Positive = 1.0  # factor on the shape
+    position: Vector = (0.0, 0.0, 0.0)  # of its centroid, or of a point of the plane [m]
+    orientation: Orientation = (1.0, 0.0, 0.0, 0.0)
+    colour: Colour = "#8899aa"
+    opacity: Fraction = 1.0  # 0 is not drawn
+    motion: Motion | None = None
+    surface_velocity: Vector | None = None  # of a conveyor, world axes, felt by friction [m/s]
