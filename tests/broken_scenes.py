@@ -4,7 +4,7 @@
 WORLD = "[world]\nsize = [4.0, 4.0, 4.0]\n"
 GROUP = '[[particles]]\nshape = "sphere"\ncount = 10\nsize = 0.2\n'
 GOOD = WORLD + GROUP
-ALL_KEYS = "title, seed, duration, world, particles, obstacles, contact, solver, movie, camera, show"
+ALL_KEYS = "title, seed, duration, world, particles, emitters, sinks, obstacles, contact, solver, movie, camera, show"
 VECTOR = "must be a list of 3 finite numbers, [x, y, z]"
 COUNT = "must be a whole number from 0 to 100,000,000"
 SIZE = 'must be a number above 0, or a table such as { kind = "uniform", low = 0.1, high = 0.2 }'
@@ -61,11 +61,36 @@ def moving(**keys):
     return obstacle(motion="{ " + ", ".join(f"{key} = {value}" for key, value in keys.items()) + " }")
 
 
+def emitter(more="", **keys):
+    """A scene with an emitter."""
+    usual = {"shape": '"sphere"', "count": "5", "size": "0.2", "rate": "10", "region": f"{{ {UP} }}"}
+    return GOOD + "[[emitters]]\n" + _lines({**usual, **keys}) + more
+
+
+UP = "lower = [-1, -1, 1], upper = [1, 1, 1.5]"
+LID = '[[obstacles]]\nshape = { kind = "box", edges = [3, 3, 1] }\nposition = [0, 0, 1.3]\n'
 BALL_IN = poses("{ position = [0.3, 0, 0] }") + '[[obstacles]]\nshape = "cube"\nsize = 0.5\n'
 NARROW = "lower = [0, 0, 0], upper = [0.1, 1, 1]"
 ROUND = 'lower = [-0.5, -0.5, -0.5], upper = [0.5, 0.5, 0.5], form = "ellipsoid"'
 
 BROKEN = [
+    (WORLD, "there must be [[particles]] or [[emitters]]"),
+    (emitter(rate=None), "emitters[0]: the key 'rate' is missing"),
+    (emitter(rate="0"), "emitters[0].rate = 0: must be a number above 0"),
+    (emitter(count=None), "emitters[0]: the key 'count' is missing"),
+    (emitter(region=None), "emitters[0]: the key 'region' is missing"),
+    (emitter(placement='"lattice"'), "emitters[0]: an emitter has a region in place of a placement"),
+    (emitter(size="0.6"), "emitters[0].size: too large: there are particles wider than the region they are placed in"),
+    (emitter(LID), "emitters[0].region: is inside an obstacle or a wall: its particles find no room"),
+    (
+        emitter(velocity='{ kind = "outward", speed = 1 }'),
+        "emitters[0]: velocity must be another than outward and inward, which are those of a start",
+    ),
+    (
+        GOOD + "[[sinks]]\nregion = { lower = [0, 0, 0], upper = [1, 0, 1] }\n",
+        "sinks[0].region: every coordinate of lower must be below that of upper",
+    ),
+    (GOOD + "[[sinks]]\nrate = 1\n", "sinks[0].rate = 1: unknown key; allowed: name, region"),
     (obstacle('"plan"'), "obstacles[0].shape = \"plan\": unknown kind; did you mean 'plane'?"),
     (
         obstacle('{ kind = "plane", normal = [0, 0, 0] }'),
@@ -130,7 +155,6 @@ BROKEN = [
         "movie.framerate = 3: unknown key; allowed: fps, speed, quality, resolution, background, crf, fade",
     ),
     (GROUP, "the key 'world' is missing"),
-    (WORLD, "the key 'particles' is missing"),
     (group(shape=None), "particles[0]: the key 'shape' is missing"),
     (group(count=None), "particles[0]: the key 'count' is missing"),
     (group(shape='"box"'), "particles[0].shape = \"box\": the key 'edges' is missing"),
@@ -161,7 +185,7 @@ BROKEN = [
         "particles: must be a list of tables: write [[particles]], in two pairs of brackets",
     ),
     ("particles = [1]\n" + WORLD, "particles[0] = 1: must be a table"),
-    ("particles = []\n" + WORLD, "particles = []: must not be empty"),
+    ("particles = []\n" + WORLD, "there must be [[particles]] or [[emitters]]"),
     ("[[world]]\nsize = [4, 4, 4]\n" + GROUP, "world: must be a table: write [world], in one pair of brackets"),
     ("solver = 3\n" + GOOD, "solver = 3: must be a table"),
     # Kinds.

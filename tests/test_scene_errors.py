@@ -15,7 +15,7 @@ def test_a_broken_scene_gets_this_line(text, line, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(text)
     with pytest.raises(ps.SceneError) as caught:
-        build(ps.load_scene("scene.toml"))
+        ps.Simulation(ps.load_scene("scene.toml"))
     error = caught.value if caught.value.file else caught.value.within("scene.toml")
     assert str(error) == f"scene.toml: {line}"
 
@@ -25,7 +25,7 @@ def test_from_python_it_is_the_same_line(text, line):
     if not text or line.startswith("not valid TOML"):
         return
     with pytest.raises(ps.SceneError) as caught:
-        build(ps.Scene(**tomllib.loads(text)))
+        ps.Simulation(ps.Scene(**tomllib.loads(text)))
     assert str(caught.value) == line
 
 

@@ -98,6 +98,11 @@ def print_summary(summary: Summary, path: Path) -> None:
         ("worst energy change", f"{summary.worst_energy_drift:.1e} of all of it"),
         *((f"lost by {cause}", f"{share:.3g} of all of it") for cause, share in summary.dissipated.items() if share),
     ]
+    came, went, waited = summary.flow
+    if came or went:
+        rows.append(("particles that came, went", f"{came:,}, {went:,}"))
+    if waited:
+        rows.append(("waited for room to come in", f"up to {waited:,} at a time"))
     if summary.work:
         rows.append(("worked by obstacles", f"{summary.work:.3g} of all of it"))
     if not summary.obstructed:

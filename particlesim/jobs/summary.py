@@ -15,7 +15,8 @@ class Summary:
     """Gathers frames as they pass: ``add`` each, then read the attributes.
 
     Energies are compared with what there was at first, or with the largest kinetic energy seen if that is more.
-    ``elastic`` says that no impact may take energy, ``obstructed`` that there are obstacles.
+    ``elastic`` says that no impact may take energy, ``obstructed`` that there are obstacles, or that particles
+    come and go.
     """
 
     def __init__(self, total_mass: float, gravity: Any, elastic: bool = True, obstructed: bool = False) -> None:
@@ -24,7 +25,7 @@ class Summary:
         self._first: Ledger | None = None
         self._last: Ledger | None = None
         self._largest_kinetic = self._largest_change = self._largest_gain = 0.0
-        self._least = math.inf
+        self._least, self._most_waiting = math.inf, 0
         self.frames = 0
         self.drawn = 0  # how many of the frames there are pictures of
         self.largest_overlap = 0.0
@@ -47,6 +48,7 @@ class Summary:
     def _account(self, ledger: Ledger) -> None:
         self._first = self._first or ledger
         self._last = ledger
+        self._most_waiting = max(self._most_waiting, ledger.waiting or 0)
         self.largest_overlap = max(self.largest_overlap, ledger.largest_overlap or 0.0)
         self._largest_kinetic = max(self._largest_kinetic, ledger.kinetic)
         self._largest_change = max(self._largest_change, abs(ledger.own_energy - self._first.own_energy))
@@ -91,6 +93,12 @@ class Summary:
             return {}
         taken = self._last.dissipated - self._first.dissipated
         return {cause: self._of_all(float(energy)) for cause, energy in zip(DISSIPATION, taken, strict=True)}
+
+    @property
+    def flow(self) -> tuple[int, int, int]:
+        """Particles that came and went up to the last frame, and the most that ever waited for room."""
+        last = self._last
+        return (last.released or 0, last.removed or 0, self._most_waiting) if last else (0, 0, 0)
 
     @property
     def work(self) -> float:

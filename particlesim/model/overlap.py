@@ -6,7 +6,7 @@ import numpy as np
 
 from particlesim.core.constants import MAX_MANIFOLD
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
-from particlesim.core.math3d import dot, sub, to_vec3
+from particlesim.core.math3d import dot, load_vec3, set_vec3, sub, to_vec3
 from particlesim.core.parallel import ThreadTeam
 from particlesim.geometry.narrow_phase.gjk import NO_SIMPLEX
 from particlesim.geometry.narrow_phase.pair import pair_overlaps, pair_separation
@@ -20,6 +20,44 @@ def offset_of(system, i, j):
     """Position of body j from that of body i, by the shortest way round a periodic domain."""
     a, b = system.body[i], system.body[j]
     return nearest_image(sub(to_vec3(b.position), to_vec3(a.position)), system.domain[0].period)
+
+
+@kernel
+def overlaps_any(shapes, a, point, others, period, points):
+    """Whether a body ``a``, put at a ``point``, overlaps any of ``others``; ``points`` is scratch."""
+    placed_a = placed(a)
+    for k in range(len(others)):
+        b = others[k]
+        offset = nearest_image(sub(to_vec3(b.position), point), period)
+        reach = a.radius + b.radius
+        near = dot(offset, offset) <= reach * reach
+        if near and pair_separation(shapes, placed_a, placed(b), offset, NO_SIMPLEX, points)[0] <= 0.0:
+            return True
+    return False
+
+
+@entry_kernel
+def put_where_free(system, others, count, bodies, proposals):
+    """Put each of ``bodies`` (m,) BODY at the first of its ``proposals`` (m, tries, 3) [m] where it is free.
+
+    ``others`` (k,) BODY: the first ``count`` of them are in its way; it has room for m more, which are added. Returns
+    how many found a place before one that did not.
+    """
+    system, others, bodies, proposals = without_refcounts((system, others, bodies, proposals))
+    points, period = np.empty((MAX_MANIFOLD, 3)), to_vec3(system.domain[0].period)
+    for i in range(len(bodies)):
+        found = False
+        for attempt in range(proposals.shape[1]):
+            point = load_vec3(proposals[i], attempt)
+            if not overlaps_any(system.shapes, bodies[i], point, others[:count], period, points):
+                set_vec3(bodies[i].position, point)
+                found = True
+                break
+        if not found:
+            return i
+        others[count] = bodies[i]
+        count += 1
+    return len(bodies)
 
 
 @entry_kernel

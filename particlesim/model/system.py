@@ -9,6 +9,7 @@ import numpy as np
 from particlesim.core.records import cache_aligned
 from particlesim.geometry.shape_table import ShapeTable
 from particlesim.geometry.shapes import Shape
+from particlesim.model.bodies import BODY
 
 
 class System(NamedTuple):
@@ -34,6 +35,7 @@ class Model(NamedTuple):
     restitution: np.ndarray  # (m,) of each material
     system: System
     obstacle_shapes: tuple[Shape, ...] = ()  # that the scene's obstacles are drawn as, in their order
+    population: np.ndarray = np.zeros(0, dtype=BODY)  # (m,) BODY, all particles that there ever are, if some come or go
 
     @property
     def particles(self) -> np.ndarray:

@@ -161,7 +161,7 @@ def light_azimuth(scene: Scene) -> float:
 
 def _reach(scene: Scene, header: Header, first: Frame, world: Box) -> Box:
     """Where particles are at first, and where they would fly freely in the scene's duration."""
-    radius = header.radius
+    radius = header.of(first).radius
     start = _extent(first.position, radius, 0)
     strays, far = int(_STRAYS * len(radius)), 2.0 * _FARTHEST * float(np.median(radius))
     lowest, highest = np.minimum(world.lower, start.lower - far), np.maximum(world.upper, start.upper + far)

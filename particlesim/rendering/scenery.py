@@ -16,7 +16,7 @@ from particlesim.trajectory.frames import Header
 
 
 class Scenery:
-    """The obstacles of a movie. Their numbers as bodies follow those of the particles.
+    """The obstacles of a movie.
 
     Attributes
     ----------
@@ -29,7 +29,6 @@ class Scenery:
     def __init__(self, scene: Scene, header: Header) -> None:
         particles = geometry_tables(header)
         self.tables = particles._replace(shapes=stack_shapes((*header.shapes, *header.obstacles)))
-        self._count = len(header.size)
         self._obstacles = obstacles_of(scene, header.obstacles)
         self._body = np.zeros(len(header.obstacles), dtype=BODY)
         self._body["shape"] = len(header.shapes) + np.arange(len(self._body))
@@ -45,24 +44,24 @@ class Scenery:
         pose = poses_at(self._obstacles, time)[which]
         tables = GeometryTables(self.tables.shapes, self._body[which], self._radius[which], np.zeros(len(which)))
         position, orientation = (np.ascontiguousarray(pose[name]) for name in ("position", "orientation"))
-        return Instances(position, orientation, tables, self._count + which)
+        return Instances(position, orientation, tables, which)
 
     def amid(self, particles: Instances, time: float) -> Instances:
-        """Instances of particles, and after them the opaque obstacles at a time [s]."""
+        """Instances of particles, and after them the opaque obstacles, whose source they are, at a time [s]."""
         if not len(self.opaque):
             return particles
         others = self.instances(self.opaque, time)
-        source = np.arange(self._count)[particles.source]
+        source = particles.bodies(np.arange(len(particles.position)))
         return Instances(
             np.concatenate([particles.position, others.position]),
             np.concatenate([particles.orientation, others.orientation]),
             joined(particles.tables, others.tables),
-            np.concatenate([source, others.bodies(np.arange(len(self.opaque)))]),
+            np.concatenate([source, self.opaque]),
         )
 
-    def colours(self, bodies: np.ndarray) -> np.ndarray:
-        """Linear RGB (k, 3) of the obstacles among all bodies that have these numbers (k,)."""
-        return self._colour[bodies - self._count]
+    def colours(self, which: np.ndarray) -> np.ndarray:
+        """Linear RGB (k, 3) of the obstacles ``which`` (k,)."""
+        return self._colour[which]
 
     def seen_through(
         self, colours: np.ndarray, depth: np.ndarray, panes: VisibilityBuffer, pane_colours: np.ndarray

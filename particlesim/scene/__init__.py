@@ -13,6 +13,7 @@ from pydantic import Field, ValidationError, model_validator
 from particlesim.scene.base import MAX_COUNT, Model, PlainFloat, Text, whole
 from particlesim.scene.camera import Camera, FixedCamera, Movie, Show
 from particlesim.scene.errors import SceneError
+from particlesim.scene.flow import Emitter, Sink
 from particlesim.scene.groups import Group
 from particlesim.scene.messages import hint, must_be, shown
 from particlesim.scene.obstacles import Obstacle
@@ -31,7 +32,9 @@ class Scene(Model):
     seed: Annotated[int, Field(ge=0, le=2**63 - 1), whole, must_be("a whole number from 0 to 2^63 - 1")] = 0
     duration: Annotated[PlainFloat, Field(gt=0, le=1e9), must_be("a number of seconds above 0, up to 1e9")] = 10.0
     world: World
-    particles: Annotated[list[Group], Field(min_length=1)]
+    particles: list[Group] = Field(default_factory=list)
+    emitters: list[Emitter] = Field(default_factory=list)
+    sinks: list[Sink] = Field(default_factory=list)
     obstacles: list[Obstacle] = Field(default_factory=list)
     contact: list[Contact] = Field(default_factory=list)
     solver: Solver = Field(default_factory=Solver)
@@ -46,11 +49,17 @@ class Scene(Model):
             raise SceneError(*explain(error, table, Scene)) from None
 
     @model_validator(mode="after")
+    def _has_particles(self) -> Scene:
+        if not self.groups:
+            raise ValueError("there must be [[particles]] or [[emitters]]")
+        return self
+
+    @model_validator(mode="after")
     def _one_scale_for_a_field(self) -> Scene:
         ranges: dict[str, tuple[float, float]] = {}
-        for g, group in enumerate(self.particles):
+        for g, group in enumerate(self.groups):
             if group.colour_range and ranges.setdefault(group.colour, group.colour_range) != group.colour_range:
-                raise ValueError(f"particles[{g}] has another colour_range for {group.colour} than a group before it")
+                raise ValueError(f"{self.key(g)} has another colour_range for {group.colour} than a group before it")
         return self
 
     @model_validator(mode="after")
@@ -89,14 +98,29 @@ class Scene(Model):
     @property
     def _entries(self) -> list[tuple[str, Group | Obstacle]]:
         """All that may have a name, with their keys."""
-        groups = ((f"particles[{g}]", group) for g, group in enumerate(self.particles))
+        groups = ((self.key(g), group) for g, group in enumerate(self.groups))
         obstacles = ((f"obstacles[{k}]", obstacle) for k, obstacle in enumerate(self.obstacles))
         return [*groups, *obstacles]
 
     @property
+    def groups(self) -> list[Group]:
+        """All groups of particles: those that are there from the start, then those of emitters."""
+        return [*self.particles, *self.emitters]
+
+    def key(self, g: int) -> str:
+        """Where the group ``g`` of all stands in a scene file."""
+        first = len(self.particles)
+        return f"particles[{g}]" if g < first else f"emitters[{g - first}]"
+
+    @property
     def number(self) -> int:
-        """How many particles the scene has."""
-        return sum(group.number for group in self.particles)
+        """How many particles the scene has, those that are yet to come among them."""
+        return sum(group.number for group in self.groups)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether particles come and go."""
+        return bool(self.emitters or self.sinks)
 
     @property
     def box_shown(self) -> bool:

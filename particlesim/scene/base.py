@@ -9,7 +9,16 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from PIL import ImageColor
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    create_model,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from particlesim.scene.errors import SceneError
@@ -69,6 +78,25 @@ class Model(BaseModel):
             super().__setattr__(name, value)
         except ValidationError as error:
             raise SceneError(*explain(error, {name: value}, type(self))) from None
+
+
+# 'from' is a word of Python, which no class can have for a field.
+_SPAN: dict[str, Any] = {"from": (NotNegative, 0.0), "until": (Positive | None, None)}
+
+
+class Timed(create_model("Span", __base__=Model, **_SPAN)):  # type: ignore[misc]
+    """Goes on from a time until another one [s]; before and after it nothing goes on."""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Timed:
+        if self.until is not None and self.until <= self.begin:
+            raise ValueError(f"until must be after from, but {self.until:g} is not after {self.begin:g}")
+        return self
+
+    @property
+    def begin(self) -> float:
+        """When it begins [s]."""
+        return float(getattr(self, "from"))
 
 
 # The folder that paths in a scene start at; None for a scene that was stored, whose files need not be there any more.

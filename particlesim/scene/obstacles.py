@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, create_model, model_validator
+from pydantic import AfterValidator, Field
 
 from particlesim.scene.base import (
     Colour,
@@ -15,6 +15,7 @@ from particlesim.scene.base import (
     NotNegative,
     Positive,
     Text,
+    Timed,
     Vector,
     shorthand,
 )
@@ -39,24 +40,6 @@ ObstacleShape = Annotated[
         _ObstacleShapes | Literal["plane", "sphere", "cylinder", "cone", "cube", "tetrahedron", "pyramid"],
     ),
 ]
-
-# 'from' is a word of Python, which no class can have for a field.
-_SPAN: dict[str, Any] = {"from": (NotNegative, 0.0), "until": (Positive | None, None)}
-
-
-class Timed(create_model("Span", __base__=Model, **_SPAN)):  # type: ignore[misc]
-    """Goes on from a time until another one [s]; before and after it nothing goes on."""
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Timed:
-        if self.until is not None and self.until <= self.begin:
-            raise ValueError(f"until must be after from, but {self.until:g} is not after {self.begin:g}")
-        return self
-
-    @property
-    def begin(self) -> float:
-        """When it begins [s]."""
-        return float(getattr(self, "from"))
 
 
 class SpinMotion(Timed):

@@ -8,6 +8,7 @@ from typing import Any
 from particlesim.scene import Scene
 from particlesim.scene.base import MAX_COUNT, Model
 from particlesim.scene.file import SceneError, parse_scene
+from particlesim.scene.flow import Emitter
 from particlesim.scene.groups import Group, ListPlacement
 from particlesim.scene.surface import Contact
 from particlesim.scene.world import World
@@ -31,10 +32,12 @@ def with_movie(scene: Scene, **values: Any) -> Scene:
 
 def with_colour(scene: Scene, colour: str) -> Scene:
     """The scene with all particles coloured like this. SceneError if it is no colour."""
-    # A range is one of the field that it was given for.
-    kept = [group.colour_range if group.colour == colour else None for group in scene.particles]
-    pairs = zip(scene.particles, kept, strict=True)
-    return replaced(scene, particles=[{**dict(group), "colour": colour, "colour_range": span} for group, span in pairs])
+    recoloured = [
+        # A range is one of the field that it was given for.
+        {**dict(group), "colour": colour, "colour_range": group.colour_range if group.colour == colour else None}
+        for group in scene.groups
+    ]
+    return replaced(scene, **_grouped(scene, recoloured))
 
 
 def with_look(scene: Scene, other: Scene) -> Scene:
@@ -42,24 +45,24 @@ def with_look(scene: Scene, other: Scene) -> Scene:
 
     SceneError if the other one has another number of groups.
     """
-    if len(other.particles) != len(scene.particles):
-        there, here = len(other.particles), len(scene.particles)
+    if len(other.groups) != len(scene.groups):
+        there, here = len(other.groups), len(scene.groups)
         raise SceneError(f"has {there} groups of particles, but {here} are to be drawn", "particles")
     groups = [
         own.model_copy(update={"colour": look.colour, "colour_range": look.colour_range})
-        for own, look in zip(scene.particles, other.particles, strict=True)
+        for own, look in zip(scene.groups, other.groups, strict=True)
     ]
-    return scene.model_copy(update={"particles": groups, **{key: getattr(other, key) for key in _LOOK}})
+    return scene.model_copy(update={**_grouped(scene, groups), **{key: getattr(other, key) for key in _LOOK}})
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
     """A twin of the scene with ``factor`` times as many particles that fill the same part of the world.
 
-    Sizes, the spacing of lattices and rolling friction are multiplied by factor^(-1/3); a given mass and temperatures
-    by 1 / factor, so that density, speeds, energy and pressure stay. Particles of a list stay as they are. SceneError
-    if there are no others, or too many.
+    Emitters go ``factor`` times as fast. Sizes, the spacing of lattices and rolling friction are multiplied by
+    factor^(-1/3); a given mass and temperatures by 1 / factor, so that density, speeds, energy and pressure stay.
+    Particles of a list stay as they are. SceneError if there are no others, or too many.
     """
-    counted = [group for group in scene.particles if not isinstance(group.placement, ListPlacement)]
+    counted = [group for group in scene.groups if not isinstance(group.placement, ListPlacement)]
     if not counted:
         raise SceneError("all of them are placed by lists, which cannot be scaled", "particles")
     number = sum(_scaled_count(group, factor) for group in counted)
@@ -68,11 +71,18 @@ def scaled(scene: Scene, factor: float) -> Scene:
     return replaced(
         scene,
         world=_rolling(scene.world, factor),
-        particles=[
-            group if isinstance(group.placement, ListPlacement) else _scaled(group, factor) for group in scene.particles
-        ],
+        **_grouped(
+            scene,
+            [group if isinstance(group.placement, ListPlacement) else _scaled(group, factor) for group in scene.groups],
+        ),
         contact=[_rolling(contact, factor) for contact in scene.contact],
     )
+
+
+def _grouped(scene: Scene, groups: list[Any]) -> dict[str, list[Any]]:
+    """Groups in the order of ``scene.groups`` under the keys that they stand in."""
+    first = len(scene.particles)
+    return {"particles": groups[:first], "emitters": groups[first:]}
 
 
 def _length(factor: float) -> float:
@@ -101,6 +111,7 @@ def _scaled(group: Group, factor: float) -> dict[str, Any]:
         "velocity": _times(group.velocity, energy, "temperature"),
         "spin": _times(group.spin, energy, "temperature"),
         "mass": None if group.mass is None else group.mass / factor,
+        **({"rate": group.rate * factor} if isinstance(group, Emitter) else {}),
     }
 
 

@@ -49,16 +49,19 @@ def build(scene: Scene, obstacles: Sequence[Obstacle] = ()) -> Model:
     SceneError if something does not fit or cannot be read.
     """
     check_memory(scene.number)
-    randoms = [np.random.default_rng([scene.seed, g]) for g in range(len(scene.particles))]
+    randoms = [np.random.default_rng([scene.seed, g]) for g in range(len(scene.groups))]
     shapes, shape_of_group = _shapes(scene)
     domain = build_domain(scene)
     particles = _particles(scene, shapes, shape_of_group, randoms)
     _check_sizes(scene, domain[0], particles)
-    _check_volume(scene, domain[0], shapes, particles)
     particles["orientation"] = _orientations(scene, shapes, particles, randoms)
+    to_come = particles[particles["group"] >= len(scene.particles)]
+    particles = particles[particles["group"] < len(scene.particles)]
+    _check_volume(scene, domain[0], shapes, particles)
     own = obstacles_of(scene)
     model = assemble(shapes, particles, domain, materials_of(scene), [*own, *obstacles], pair_laws_of(scene))
     model = model._replace(obstacle_shapes=drawn_shapes(scene, own))
+    set_in_motion(scene, to_come, randoms)
     crowd = Crowd(*(np.ascontiguousarray(particles[name]) for name in ("shape_row", "group", "scale", "radius")))
     particles = model.particles
     place_kinematic(model.system.body, model.system.motion, 0.0)
@@ -68,7 +71,7 @@ def build(scene: Scene, obstacles: Sequence[Obstacle] = ()) -> Model:
     )
     set_in_motion(scene, particles, randoms)
     _check_apart(scene, model.system)
-    return model
+    return model._replace(population=np.concatenate([particles, to_come])) if scene.is_open else model
 
 
 def assemble(
@@ -103,7 +106,7 @@ def assemble(
 def materials_of(scene: Scene) -> list[Material]:
     """The material of the walls, then that of each group."""
     usual = scene.world.surface
-    return [Material(**usual), *(Material(**{**usual, **group.surface}) for group in scene.particles)]
+    return [Material(**usual), *(Material(**{**usual, **group.surface}) for group in scene.groups)]
 
 
 def contact_laws_of(scene: Scene) -> np.ndarray:
@@ -113,7 +116,7 @@ def contact_laws_of(scene: Scene) -> np.ndarray:
 
 def pair_laws_of(scene: Scene) -> list[PairLaw]:
     """What the scene says of contacts between two of the materials."""
-    names = [*(group.name for group in scene.particles), *(obstacle.name for obstacle in scene.obstacles)]
+    names = [*(group.name for group in scene.groups), *(obstacle.name for obstacle in scene.obstacles)]
     row = {WALLS: 0, **{name: k for k, name in enumerate(names, 1) if name is not None}}
     between = ((contact.between, contact.surface) for contact in scene.contact)
     return [PairLaw(row[a], row[b], values) for (a, b), values in between]
@@ -131,8 +134,8 @@ def space_of(domain: np.ndarray) -> Space:
     return Space(*(domain[0][name].copy() for name in ("lower", "upper", "boundary", "period")))
 
 
-def _key(group: int, key: str) -> str:
-    return f"particles[{group}].{key}"
+def _key(scene: Scene, g: int, key: str) -> str:
+    return f"{scene.key(g)}.{key}"
 
 
 def _shapes(scene: Scene) -> tuple[list[Shape], list[int]]:
@@ -140,8 +143,8 @@ def _shapes(scene: Scene) -> tuple[list[Shape], list[int]]:
     shapes: list[Shape] = []
     numbers: dict[str, int] = {}
     of_group = []
-    for g, group in enumerate(scene.particles):
-        shape = shape_of(group.shape, _key(g, "shape"))
+    for g, group in enumerate(scene.groups):
+        shape = shape_of(group.shape, _key(scene, g, "shape"))
         name = group.shape.model_dump_json()
         if name not in numbers:
             numbers[name] = len(shapes)
@@ -163,13 +166,13 @@ def _particles(
     scene: Scene, shapes: list[Shape], shape_of_group: list[int], randoms: list[np.random.Generator]
 ) -> np.ndarray:
     """The particles of a scene, (n,) BODY, not placed yet."""
-    counts = [group.number for group in scene.particles]
+    counts = [group.number for group in scene.groups]
     group_of = np.repeat(np.arange(len(counts)), counts)
     shape = np.array(shape_of_group)[group_of]
-    size = np.concatenate([_sizes(g, r) for g, r in zip(scene.particles, randoms, strict=True)])
+    size = np.concatenate([_sizes(g, r) for g, r in zip(scene.groups, randoms, strict=True)])
     volume = np.array([s.volume for s in shapes])[shape] * size**3
-    density = np.array([_DEFAULT_DENSITY if g.density is None else g.density for g in scene.particles])[group_of]
-    mass = np.array([math.nan if g.mass is None else g.mass for g in scene.particles])[group_of]
+    density = np.array([_DEFAULT_DENSITY if g.density is None else g.density for g in scene.groups])[group_of]
+    mass = np.array([math.nan if g.mass is None else g.mass for g in scene.groups])[group_of]
     density = np.where(np.isnan(mass), density, mass / volume)
     return make_particles(shapes, shape, group_of, size, density)
 
@@ -195,7 +198,7 @@ def _memory() -> float:
 
 def _check_sizes(scene: Scene, domain: np.void, particles: np.ndarray) -> None:
     """Walls must leave room, and a particle must not meet itself round a periodic domain."""
-    for g, group in enumerate(scene.particles):
+    for g, group in enumerate(scene.groups):
         members = particles["group"] == g
         value = group.size.value if isinstance(group.size, FixedSize) else None
         widest = 2.0 * particles["radius"][members].max(initial=0.0)
@@ -210,7 +213,7 @@ def _check_sizes(scene: Scene, domain: np.void, particles: np.ndarray) -> None:
             elif domain["boundary"][axis] == WALL and narrowest > edge:
                 wrong = f"too large: particles are {narrowest:.4g} m thick, between walls {edge:.4g} m apart"
             if wrong is not None:
-                raise SceneError(wrong + unit_hint(group), _key(g, "size"), value)
+                raise SceneError(wrong + unit_hint(group), _key(scene, g, "size"), value)
 
 
 def _check_volume(scene: Scene, domain: np.void, shapes: list[Shape], particles: np.ndarray) -> None:
@@ -228,7 +231,7 @@ def _orientations(
 ) -> np.ndarray:
     """Orientations of all particles, (n, 4)."""
     parts = [np.zeros((0, 4))]
-    for g, (group, random) in enumerate(zip(scene.particles, randoms, strict=True)):
+    for g, (group, random) in enumerate(zip(scene.groups, randoms, strict=True)):
         listed = isinstance(group.placement, ListPlacement)
         if isinstance(group.placement, ListPlacement):
             q = np.array([quaternion_of(pose.orientation) for pose in group.placement.poses])
@@ -279,8 +282,8 @@ def _start_error(scene: Scene, body: np.ndarray, i: int, wrong: str) -> SceneErr
     g, k = _place_in_group(body, i)
     placement = scene.particles[g].placement
     if isinstance(placement, ListPlacement):
-        return SceneError(wrong, _key(g, f"placement.poses[{k}].position"), placement.poses[k].position)
-    return SceneError(f"particle {k} {wrong}", _key(g, "placement"))
+        return SceneError(wrong, _key(scene, g, f"placement.poses[{k}].position"), placement.poses[k].position)
+    return SceneError(f"particle {k} {wrong}", _key(scene, g, "placement"))
 
 
 def _place_in_group(body: np.ndarray, i: int) -> tuple[int, int]:

@@ -26,8 +26,10 @@ def random_quaternions(random: np.random.Generator, count: int) -> np.ndarray:
 
 def set_in_motion(scene: Scene, bodies: np.ndarray, randoms: list[np.random.Generator]) -> None:
     """Give particles (n,) BODY, which stand where they start, the velocities and spins that their groups say."""
-    for g, (group, random) in enumerate(zip(scene.particles, randoms, strict=True)):
+    for g, (group, random) in enumerate(zip(scene.groups, randoms, strict=True)):
         members = bodies["group"] == g
+        if not members.any():
+            continue
         own = bodies[members]
         bodies["velocity"][members] = _velocities(group, own["position"], own["mass"], random)
         bodies["angular_momentum"][members] = _angular_momenta(

@@ -70,7 +70,7 @@ def positions(
             extent = (above[members] - below[members]).max(axis=0, initial=0.0)
             position[members] = _on_lattice(g, group.placement, world, len(members), extent, randoms[g])
     inserted = {
-        g: _Trials(g, group, group.placement, world, (below, above), members, randoms[g])
+        g: Trials(scene.key(g), group, group.placement, world, (below, above), members, randoms[g])
         for g, (group, members) in enumerate(zip(scene.particles, groups, strict=True))
         if isinstance(group.placement, RandomPlacement | ClusterPlacement) and len(members)
     }
@@ -87,7 +87,7 @@ def positions(
     return np.ascontiguousarray(position)
 
 
-def _insert(known: Known, insertion: Insertion, trials: _Trials, left: np.ndarray) -> int:
+def _insert(known: Known, insertion: Insertion, trials: Trials, left: np.ndarray) -> int:
     """Put the particles of ``left`` (m,) at random between those in place; how many found no room."""
     before, look, tried = len(left), _FIRST_LOOK, 0
     while len(left) and tried < _MAX_TRIALS:
@@ -162,7 +162,7 @@ def _on_lattice(
         raise SceneError(f"too tight: {span}", f"particles[{g}].placement.spacing", lattice.spacing)
     moved = points + random.uniform(-0.5, 0.5, points.shape) * (lattice.jitter * (spacing - extent))
     if _is_round(lattice.region):
-        outside = _from_middle(moved, lower + 0.5 * extent, upper - 0.5 * extent) > 1.0
+        outside = from_middle(moved, lower + 0.5 * extent, upper - 0.5 * extent) > 1.0
         moved[outside] = points[outside]
     return moved
 
@@ -178,7 +178,7 @@ def _round_lattice(
     tried = spacing or float((np.pi / 6.0 * edges.prod() / count) ** (1.0 / 3.0))
     while True:
         points, _ = lattice_points(lower, upper, np.iinfo(np.int64).max, tried)
-        distance = _from_middle(points, lower + 0.5 * extent, upper - 0.5 * extent)
+        distance = from_middle(points, lower + 0.5 * extent, upper - 0.5 * extent)
         inside = np.argsort(distance, kind="stable")[: min(count, int(np.count_nonzero(distance <= 1.0)))]
         if len(inside) == count or spacing is not None or (extent > tried).any():
             return points[np.sort(inside)], tried
@@ -189,7 +189,7 @@ def _is_round(region: Region | None) -> bool:
     return region is not None and region.form == "ellipsoid"
 
 
-def _from_middle(points: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+def from_middle(points: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Distance of points (m, 3) from the middle of a box, 1 on the ellipsoid that just fits into it."""
     # One of no extent has its middle only; what is off it is far away, by a number that has a square.
     half = np.maximum(0.5 * (upper - lower), 1e-100)
@@ -197,7 +197,7 @@ def _from_middle(points: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np
 
 
 def _centres(
-    g: int,
+    key: str,
     where: ClusterPlacement,
     bounds: tuple[np.ndarray, np.ndarray],
     particles: int,
@@ -217,15 +217,13 @@ def _centres(
         return random.uniform(lower, upper, (number, 3))
     for k, centre in enumerate(where.centres):
         outside = (np.array(centre) < lower).any() or (np.array(centre) > upper).any()
-        if outside or (is_round and _from_middle(np.array(centre), lower, upper) > 1.0):
-            raise SceneError(
-                "lies outside of where its particles may be", f"particles[{g}].placement.centres[{k}]", centre
-            )
+        if outside or (is_round and from_middle(np.array(centre), lower, upper) > 1.0):
+            raise SceneError("lies outside of where its particles may be", f"{key}.placement.centres[{k}]", centre)
     return np.array(where.centres)
 
 
-class _Trials:
-    """Random proposals for the positions of a group's particles.
+class Trials:
+    """Random proposals for the positions of a group's particles, which stands under ``key`` of a scene.
 
     ``extent`` are the lower and upper corners of all particles' AABBs relative to their centroids, (n, 3) each [m];
     ``members`` (m,) the particles of the group.
@@ -233,7 +231,7 @@ class _Trials:
 
     def __init__(
         self,
-        g: int,
+        key: str,
         group: Group,
         where: RandomPlacement | ClusterPlacement,
         world: Space,
@@ -249,9 +247,9 @@ class _Trials:
         self._upper = upper - np.where(free, 0.0, extent[1])
         self._centres = np.zeros((0, 3))
         if isinstance(where, ClusterPlacement):
-            self._centres = _centres(g, where, (lower, upper), int(members.max()) + 1, random)
+            self._centres = _centres(key, where, (lower, upper), int(members.max()) + 1, random)
         self._too_large = "too large: there are particles wider than the region they are placed in" + unit_hint(group)
-        self._key = f"particles[{g}].size"
+        self._key = f"{key}.size"
 
     def draw(self, indices: np.ndarray) -> np.ndarray:
         """A position for each particle of ``indices`` (m,), (m, 3)."""
@@ -264,14 +262,14 @@ class _Trials:
         for _ in range(100):
             outside = ((points < lower) | (points > upper)).any(axis=1)
             if is_round:
-                outside |= _from_middle(points, lower, upper) > 1.0
+                outside |= from_middle(points, lower, upper) > 1.0
             if not outside.any():
                 return points
             points[outside] = self._proposed(indices[outside], lower[outside], upper[outside])
         points = np.clip(points, lower, upper)
         if is_round:
             middle = 0.5 * (lower + upper)
-            points = middle + (points - middle) / np.maximum(_from_middle(points, lower, upper), 1.0)[:, None]
+            points = middle + (points - middle) / np.maximum(from_middle(points, lower, upper), 1.0)[:, None]
         return points
 
     def _proposed(self, indices: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:

@@ -17,11 +17,10 @@ from particlesim.core.constants import MAX_MANIFOLD
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import dot, sub, to_quat, to_vec3
 from particlesim.core.records import record
-from particlesim.geometry.narrow_phase.gjk import NO_SIMPLEX
-from particlesim.geometry.narrow_phase.pair import pair_overlaps, pair_separation
+from particlesim.geometry.narrow_phase.pair import pair_overlaps
 from particlesim.geometry.support import is_sphere
-from particlesim.model.bodies import placed
 from particlesim.model.domain import nearest_image
+from particlesim.model.overlap import overlaps_any
 from particlesim.setup.space import Crowd, Space
 
 # Cells along an axis: enough for any number of particles, few enough for whole numbers.
@@ -203,21 +202,6 @@ def _overlaps_any(table, insertion, i, point, points):
     return False
 
 
-@kernel
-def _overlaps_obstacle(table, obstacles, insertion, i, point, points):
-    """Whether particle i at ``point`` overlaps an obstacle."""
-    a, period = insertion.body[i], to_vec3(insertion.space[0].period)
-    placed_a = a.shape_row, a.scale, to_quat(a.orientation)
-    for k in range(len(obstacles)):
-        b = obstacles[k]
-        offset = nearest_image(sub(to_vec3(b.position), point), period)
-        reach = a.radius + b.radius
-        near = dot(offset, offset) <= reach * reach
-        if near and pair_separation(table, placed_a, placed(b), offset, NO_SIMPLEX, points)[0] <= 0.0:
-            return True
-    return False
-
-
 @entry_kernel
 def try_in_place(known, insertion, indices, proposals):
     """Put each particle of ``indices`` (m,), all of one level, at the first of its ``proposals`` where it is free.
@@ -227,7 +211,7 @@ def try_in_place(known, insertion, indices, proposals):
     been filed under this level (see ``refile``).
     """
     (table, obstacles), insertion = without_refcounts(known), without_refcounts(insertion)
-    points = np.empty((MAX_MANIFOLD, 3))
+    points, period = np.empty((MAX_MANIFOLD, 3)), to_vec3(insertion.space[0].period)
     fits = np.zeros(len(indices), dtype=np.bool_)
     for k in range(len(indices)):
         i = indices[k]
@@ -235,7 +219,7 @@ def try_in_place(known, insertion, indices, proposals):
             point = to_vec3(proposals[k, attempt])
             if not (
                 _overlaps_any(table, insertion, i, point, points)
-                or _overlaps_obstacle(table, obstacles, insertion, i, point, points)
+                or overlaps_any(table, insertion.body[i], point, obstacles, period, points)
             ):
                 for axis in range(3):
                     insertion.body[i].position[axis] = point[axis]

@@ -19,6 +19,7 @@ from particlesim.geometry.shapes import Shape
 from particlesim.model.system import Model, System
 from particlesim.scene import Scene
 from particlesim.scene.file import SceneError, stored_scene
+from particlesim.simulation.flow import FlowState
 
 _FORMAT = 3
 
@@ -34,12 +35,13 @@ class Checkpoint(NamedTuple):
     model: Model
     state: SolverState
     counts: Counts
+    flow: FlowState
     done: dict[str, Any]  # steps, time_step [s], broad_phase
 
 
 def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
     """Write a checkpoint to ``path``, whole or not at all. OSError if it cannot be written."""
-    scene, model, state, counts, done = checkpoint
+    scene, model, state, counts, flow, done = checkpoint
     system = model.system._asdict()
     text = {
         "format": _FORMAT,
@@ -55,7 +57,8 @@ def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
     arrays |= {f"system.{name}": array for name, array in system.items()}
     arrays |= {f"state.{name}": array for name, array in state.arrays().items()}
     arrays |= {f"counts.{name}": np.asarray(value) for name, value in asdict(counts).items()}
-    arrays["restitution"] = model.restitution
+    arrays |= {f"flow.{name}": array for name, array in flow.arrays().items()}
+    arrays["restitution"], arrays["population"] = model.restitution, model.population
     arrays["text"] = np.frombuffer(json.dumps(text).encode(), dtype=np.uint8)
     with atomic_write(path) as hidden, open(hidden, "wb") as file:
         np.savez(file, **arrays)
@@ -86,11 +89,12 @@ def _assembled(text: dict[str, Any], arrays: dict[str, np.ndarray]) -> Checkpoin
     arrays["system.body"] = cache_aligned(arrays["system.body"])
     system = System(table, particles=text["particles"], bounded=text["bounded"], **_under("system.", arrays))
     shapes, drawn = (tuple(_shape(each) for each in text[key]) for key in ("shapes", "obstacle_shapes"))
-    model = Model(shapes, arrays["restitution"], system, drawn)
+    model = Model(shapes, arrays["restitution"], system, drawn, arrays["population"])
     counted = _under("counts.", arrays)
     counts = Counts(**{f.name: _plain(counted[f.name]) for f in fields(Counts)})
     state = SolverState.of_arrays(_under("state.", arrays))
-    return Checkpoint(stored_scene(json.loads(text["scene"])), model, state, counts, text["done"])
+    flow = FlowState(**_under("flow.", arrays))
+    return Checkpoint(stored_scene(json.loads(text["scene"])), model, state, counts, flow, text["done"])
 
 
 def _under(prefix: str, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -33,11 +33,14 @@ def estimate(scene: Scene) -> list[tuple[str, str]]:
 
 def _particle_rows(simulation: Simulation) -> list[tuple[str, str]]:
     """How many particles there are in all and in each group, with their shape, sizes and mass."""
-    particles = simulation.model.particles
+    model = simulation.model
+    particles = model.population if simulation.scene.is_open else model.particles
     rows = [("particles", f"{len(particles):,}")]
-    for g, group in enumerate(simulation.scene.particles):
+    for g, group in enumerate(simulation.scene.groups):
         members = particles[particles["group"] == g]
-        rows.append((f"  {group.name or f'particles[{g}]'}", _group(simulation, members) if len(members) else "none"))
+        rows.append(
+            (f"  {group.name or simulation.scene.key(g)}", _group(simulation, members) if len(members) else "none")
+        )
     return rows
 
 

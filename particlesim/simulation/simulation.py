@@ -21,6 +21,7 @@ from particlesim.scene import Scene
 from particlesim.setup.build import build
 from particlesim.simulation.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from particlesim.simulation.conserved import conserved
+from particlesim.simulation.flow import Flow, FlowState
 from particlesim.trajectory.frames import Frame, Header, Ledger
 
 
@@ -50,17 +51,24 @@ class Simulation:
         return simulation
 
     def _begin(
-        self, scene: Scene, model: Model, broad_phase: str | None, threads: int | None, state: SolverState | None = None
+        self,
+        scene: Scene,
+        model: Model,
+        broad_phase: str | None,
+        threads: int | None,
+        states: tuple[SolverState, FlowState] | None = None,
     ) -> None:
-        """Start from a model, or go on from a solver state."""
+        """Start from a model, or go on from the state of a solver and of what came and went."""
         self.scene, self._threads = scene, threads
         chosen = scene.solver.broad_phase
         if broad_phase not in (None, *METHODS):
             raise ValueError(f"unknown broad phase '{broad_phase}'; there are {', '.join(METHODS)}")
         self.broad_phase = broad_phase or chosen.kind
         parameters = chosen.model_dump(exclude={"kind"}) if broad_phase in (None, chosen.kind) else {}
+        state, flow_state = (None, None) if states is None else states
         self._frame_time = scene.time_of(1)
         self._solver = Solver(model, partial(METHODS[self.broad_phase], **parameters), state)
+        self._flow = Flow(scene, model, flow_state)
         self.steps = 0
         self.time_step = self.next_time_step()
 
@@ -80,7 +88,9 @@ class Simulation:
             If it cannot be written.
         """
         done = {"steps": self.steps, "time_step": self.time_step, "broad_phase": self.broad_phase}
-        write_checkpoint(path, Checkpoint(self.scene, self.model, self._solver.state, self._solver.counts, done))
+        write_checkpoint(
+            path, Checkpoint(self.scene, self.model, self._solver.state, self._solver.counts, self._flow.state, done)
+        )
 
     @classmethod
     def load(cls, path: str | Path, broad_phase: str | None = None, threads: int | None = None) -> Simulation:
@@ -104,7 +114,7 @@ class Simulation:
         simulation = cls.__new__(cls)
         chosen = found.done["broad_phase"] if broad_phase is None else broad_phase
         with limit_threads(threads):
-            simulation._begin(found.scene, found.model, chosen, threads, found.state)
+            simulation._begin(found.scene, found.model, chosen, threads, (found.state, found.flow))
         simulation._solver.counts = found.counts
         simulation.steps, simulation.time_step = found.done["steps"], found.done["time_step"]
         return simulation
@@ -148,9 +158,17 @@ class Simulation:
         with limit_threads(self._threads):
             self.time_step = self.next_time_step() if time_step is None else time_step
             self._solver.step(self.time_step)
+            changed = self._flow.exchange(self.model, self.time)
+            if changed is not None:
+                self._solver.change_particles(*changed)
         self.steps += 1
 
     # ---- looking ---------------------------------------------------------------------------------------------------
+
+    @property
+    def removed(self) -> np.ndarray:
+        """How many particles of each group sinks have taken out, (groups,) int64."""
+        return self._flow.state.removed.copy()
 
     @property
     def model(self) -> Model:
@@ -187,7 +205,7 @@ class Simulation:
     @property
     def ledger(self) -> Ledger:
         """Sums over all particles now, and counts since the start."""
-        counts = self._solver.counts
+        counts, flow = self._solver.counts, self._flow.state
         (translational, rotational, potential), momentum, angular = conserved(self.model.system)
         return Ledger(
             time=self.time,
@@ -207,6 +225,11 @@ class Simulation:
             dissipated=counts.dissipated.copy(),
             wall_shear=counts.wall_shear.copy(),
             work=counts.work,
+            flow_mass=flow.mass.copy(),
+            flow_energy=flow.energy.copy(),
+            released=int(flow.released.sum()),
+            removed=int(flow.removed.sum()),
+            waiting=int(flow.waiting.sum()),
         )
 
     def largest_overlap(self) -> float:
@@ -221,7 +244,7 @@ class Simulation:
     @property
     def header(self) -> Header:
         """What stays the same from frame to frame."""
-        b = self.model.particles
+        b = self.model.population if self.scene.is_open else self.model.particles
         return Header(
             self.scene.model_dump_json(),
             self.model.shapes,
@@ -246,12 +269,14 @@ class Simulation:
             image=b["image"].astype(np.int64),
             impacts=self._solver.counts.each.copy(),
             ledger=replace(self.ledger, largest_overlap=self.largest_overlap()),
+            present=b["id"].astype(np.int64) if self.scene.is_open else None,
         )
 
     def state_hash(self) -> str:
         """SHA-256 of everything that the next step depends on: two runs that agree in it go on the same to the bit."""
-        system = self.model.system
-        return digest(system.body, system.law, system.motion, system.domain, *self._solver.state.arrays().values())
+        system, states = self.model.system, (self._solver.state, self._flow.state)
+        arrays = [array for state in states for array in state.arrays().values()]
+        return digest(system.body, system.law, system.motion, system.domain, *arrays)
 
     def _check_finite(self) -> None:
         b = self.model.particles
@@ -259,6 +284,5 @@ class Simulation:
             bad = np.flatnonzero(~np.isfinite(b[name]).all(axis=1))
             if len(bad):
                 i = int(bad[0])
-                raise SimulationError(
-                    f"{name} of particle {i} (particles[{b['group'][i]}] of the scene) is not finite at {self.time:g} s"
-                )
+                whose = f"particle {b['id'][i]} ({self.scene.key(b['group'][i])} of the scene)"
+                raise SimulationError(f"{name} of {whose} is not finite at {self.time:g} s")

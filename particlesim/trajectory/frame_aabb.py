@@ -11,5 +11,6 @@ from particlesim.trajectory.frames import Frame, Header
 
 def frame_boxes(header: Header, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     """Lower and upper corners (n, 3) float64 [m] of the AABBs of all particles of a frame."""
+    header = header.of(frame)
     lower, upper = aabbs_of(stack_shapes(header.shapes), header.shape, header.size, frame.orientation)
     return frame.position + lower, frame.position + upper

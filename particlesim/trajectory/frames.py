@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,11 @@ class Ledger:
     dissipated: np.ndarray | None = None  # (4,) by the causes in DISSIPATION [J]; older files do not have it
     wall_shear: np.ndarray | None = None  # (6, 3) given to the walls across their normals [N s]; nor this
     work: float | None = None  # that moving obstacles did in impacts [J]; nor this
+    flow_mass: np.ndarray | None = None  # (2,) of particles that came and that went [kg]; nor this and what follows
+    flow_energy: np.ndarray | None = None  # (2,) kinetic and potential energy that they had then [J]
+    released: int | None = None  # particles that emitters put in
+    removed: int | None = None  # and that sinks took out
+    waiting: int | None = None  # particles that emitters have not found room for yet
 
     @property
     def kinetic(self) -> float:
@@ -54,8 +59,9 @@ class Ledger:
 
     @property
     def own_energy(self) -> float:
-        """Kinetic and potential energy less what moving obstacles worked [J]."""
-        return self.energy - (self.work or 0.0)
+        """Kinetic and potential energy less what moving obstacles worked and what came with particles [J]."""
+        came, went = (0.0, 0.0) if self.flow_energy is None else self.flow_energy.tolist()
+        return self.energy - (self.work or 0.0) - came + went
 
 
 def ledger_table(ledger: Ledger) -> dict[str, Any]:
@@ -71,7 +77,7 @@ def ledger_of(table: dict[str, Any]) -> Ledger:
 
 @dataclass(frozen=True)
 class Header:
-    """What stays the same from frame to frame.
+    """What stays the same from frame to frame, of all particles that there are at any time, in the order of their ids.
 
     Attributes
     ----------
@@ -102,6 +108,13 @@ class Header:
     inertia: np.ndarray
     obstacles: tuple[Shape, ...] = ()
 
+    def of(self, frame: Frame) -> Header:
+        """The header of the particles of a frame alone."""
+        if frame.present is None:
+            return self
+        names = "shape", "size", "group", "mass", "inertia"
+        return replace(self, **{name: getattr(self, name)[frame.present] for name in names})
+
     @property
     def radius(self) -> np.ndarray:
         """Of the bounding spheres, (n,) [m]."""
@@ -130,6 +143,8 @@ class Frame:
         Of each particle since the start.
     ledger
         The sums over all of them; None where they are not known.
+    present : (n,) int64
+        Their ids, rising; None where all are there.
     """
 
     time: float
@@ -140,3 +155,13 @@ class Frame:
     image: np.ndarray
     impacts: np.ndarray
     ledger: Ledger | None = None
+    present: np.ndarray | None = None
+
+    @property
+    def ids(self) -> np.ndarray:
+        """Where in the header each of its particles is, (n,) int64."""
+        return np.arange(len(self.position)) if self.present is None else self.present
+
+    def rows(self, ids: np.ndarray) -> np.ndarray:
+        """Where in the frame the particles with these ids (k,) are, (k,)."""
+        return ids if self.present is None else np.searchsorted(self.present, ids)

@@ -37,6 +37,7 @@ _MAX_SIZES, _MAX_CORNERS = 64, 20_000
 _LOG = "log/particlesim/"
 _LEDGER = _LOG + "ledger/"
 _IMPACTS = "log/particles/impacts"
+_ID = "log/particles/id"
 
 # Sides of the prism that stands for a capsule in other programs, and its radius as a fraction of the capsule's: the
 # outline is off by 0.2 %.
@@ -62,6 +63,8 @@ _SHAPES: dict[str, tuple[int, ...]] = {
     "wall_impulse": (len(WALL_NAMES),),
     "dissipated": (len(DISSIPATION),),
     "wall_shear": (len(WALL_NAMES), 3),
+    "flow_mass": (2,),
+    "flow_energy": (2,),
 }
 
 
@@ -92,12 +95,12 @@ class TrajectoryWriter:
 
     def append(self, frame: Frame) -> None:
         """Add a frame."""
-        header = self._header
+        header, ids = self._header, frame.ids
         out = gsd.hoomd.Frame()
         out.configuration.step = self._count
         out.configuration.box = self._box
         particles = out.particles
-        particles.N = len(header.shape)
+        particles.N = len(ids)
         particles.position = frame.position.astype(np.float32)
         particles.orientation = frame.orientation.astype(np.float32)
         particles.velocity = frame.velocity.astype(np.float32)
@@ -106,12 +109,15 @@ class TrajectoryWriter:
         if self._count == 0:
             particles.types = [name for name, _ in self._types]
             particles.type_shapes = [shape for _, shape in self._types]
-            particles.typeid = self._type_of.astype(np.uint32)
-            particles.mass = header.mass.astype(np.float32)
-            particles.moment_inertia = header.inertia.astype(np.float32)
-            particles.diameter = _display_diameters(header)
-            out.log.update(_logged(_header_log(header)))
+            out.log.update(_logged(_header_log(header, changing=frame.present is not None)))
+        if self._count == 0 or frame.present is not None:
+            particles.typeid = self._type_of[ids].astype(np.uint32)
+            particles.mass = header.mass[ids].astype(np.float32)
+            particles.moment_inertia = header.inertia[ids].astype(np.float32)
+            particles.diameter = _display_diameters(header)[ids]
         own = {_IMPACTS: frame.impacts.astype(np.uint32), _LOG + "time": np.array([frame.time])}
+        if frame.present is not None:
+            own[_ID] = ids.astype(np.uint32)
         out.log.update(_logged({**own, **_ledger_log(frame.ledger)}))
         self._file.append(out)
         self._count += 1
@@ -152,7 +158,7 @@ class Trajectory:
         with reading(self.path):
             table = json.loads(self.header.scene_json)
         scene = stored_scene(table)
-        if len(self.header.group) != scene.number or (self.header.group >= len(scene.particles)).any():
+        if len(self.header.group) != scene.number or (self.header.group >= len(scene.groups)).any():
             raise TrajectoryError(f"{self.path}: damaged: its particles are not those of its scene")
         return scene
 
@@ -173,9 +179,12 @@ class Trajectory:
         if not 0 <= k < len(self):
             raise IndexError(k)
         with reading(self.path):
+            present = self._chunks.read(_ID, k).astype(np.int64) if self._chunks.has(_ID) else None
+            count = len(self.header.shape) if present is None else len(present)
+            if present is not None and ((present >= len(self.header.shape)).any() or (np.diff(present) <= 0).any()):
+                raise ValueError(f"ids of frame {k}")
             each = {
-                name: self._chunks.rows("particles/" + name, len(self.header.shape), default, k)
-                for name, default in _DEFAULTS.items()
+                name: self._chunks.rows("particles/" + name, count, default, k) for name, default in _DEFAULTS.items()
             }
             if (np.abs((each["orientation"] ** 2).sum(axis=1) - 1.0) > _UNIT).any():
                 raise ValueError(f"orientations of frame {k}")
@@ -186,8 +195,9 @@ class Trajectory:
                 velocity=each["velocity"],
                 angular_momentum=_world_momentum(each["angmom"], each["orientation"]),
                 image=each["image"].astype(np.int64),
-                impacts=self._chunks.rows(_IMPACTS, len(self.header.shape), (0.0,), k)[:, 0].astype(np.int64),
+                impacts=self._chunks.rows(_IMPACTS, count, (0.0,), k)[:, 0].astype(np.int64),
                 ledger=_read_ledger(self._chunks, k),
+                present=present,
             )
 
 
@@ -240,7 +250,9 @@ def _thin_prism(shape: Shape) -> tuple[np.ndarray, float]:
     return np.concatenate([end + ring for end in shape.vertices]), shape.rounding - thin
 
 
-def _header_log(header: Header) -> dict[str, np.ndarray]:
+def _header_log(header: Header, changing: bool) -> dict[str, np.ndarray]:
+    """What the schema has no place for; where numbers are ``changing``, masses of all particles that there ever are."""
+    constants = {"mass": header.mass.astype(np.float32), "inertia": header.inertia.astype(np.float32)}
     shapes = [
         {
             "name": s.name,
@@ -263,6 +275,7 @@ def _header_log(header: Header) -> dict[str, np.ndarray]:
         _LOG + "shape": header.shape.astype(np.int32),
         _LOG + "size": header.size,
         _LOG + "group": header.group.astype(np.int32),
+        **{_LOG + name: values for name, values in constants.items() if changing},
     }
 
 
@@ -277,10 +290,15 @@ def _read_header(chunks: Chunks) -> Header:
         shape=shape,
         size=chunks.rows(_LOG + "size", len(shape), (1.0,))[:, 0],
         group=chunks.rows(_LOG + "group", len(shape), (0.0,))[:, 0].astype(np.int64),
-        mass=chunks.rows("particles/mass", len(shape), (1.0,))[:, 0],
-        inertia=chunks.rows("particles/moment_inertia", len(shape), (0.0, 0.0, 0.0)),
+        mass=chunks.rows(_either(chunks, "mass", "particles/mass"), len(shape), (1.0,))[:, 0],
+        inertia=chunks.rows(_either(chunks, "inertia", "particles/moment_inertia"), len(shape), (0.0, 0.0, 0.0)),
         obstacles=tuple(_read_obstacle(s) for s in _read_obstacles(chunks)),
     )
+
+
+def _either(chunks: Chunks, name: str, of_schema: str) -> str:
+    """Where a constant of all particles is: where their number stays the same, only as the schema has it."""
+    return _LOG + name if chunks.has(_LOG + name) else of_schema
 
 
 def _read_obstacles(chunks: Chunks) -> list[dict[str, Any]]:
@@ -353,7 +371,7 @@ def _typed(value: np.ndarray, field: Field[Any]) -> Any:
     if field.name in _SHAPES:
         return value.astype(np.float64).reshape(_SHAPES[field.name])
     (number,) = value.reshape(-1)
-    return int(number) if field.type == "int" else float(number)
+    return int(number) if str(field.type).startswith("int") else float(number)
 
 
 def _quaternion_momentum(frame: Frame) -> np.ndarray:

@@ -54,7 +54,7 @@ def swatches(scene: Scene, header: Header, can_write: Callable[[str], bool]) -> 
     """
     found: list[Swatch] = []
     of_shapes = np.sqrt(shape_colours(header))
-    for number, group in enumerate(scene.particles):
+    for number, group in enumerate(scene.groups):
         members = np.flatnonzero(header.group == number)
         if not len(members) or group.colour in FIELDS:
             continue

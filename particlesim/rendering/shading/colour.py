@@ -64,14 +64,14 @@ class ParticleColours:
         # In linear light, fine enough that no step of 8 bits is left out.
         self._map = (map_colours(np.linspace(0.0, 1.0, 1024), self.begin) ** 2).astype(np.float32)
         self._fixed = _fixed_colours(scene, header)
-        kinds = [kind for kind in FIELDS if any(group.colour == kind for group in scene.particles)]
+        kinds = [kind for kind in FIELDS if any(group.colour == kind for group in scene.groups)]
         self.fields = [field_of(kind, scene, header, frames) for kind in kinds]
         # Which of the fields a particle is coloured by, or -1.
         number = {kind: k for k, kind in enumerate(kinds)}
-        self._field = np.array([number.get(group.colour, -1) for group in scene.particles])[header.group]
+        self._field = np.array([number.get(group.colour, -1) for group in scene.groups])[header.group]
 
     def __call__(self, frame: Frame, members: np.ndarray) -> np.ndarray:
-        """Linear RGB (k, 3) float32 of the particles ``members`` (k,)."""
+        """Linear RGB (k, 3) float32 of the particles whose ids are ``members`` (k,)."""
         colours = self._fixed[members]
         for number, field in enumerate(self.fields):
             mine = self._field[members] == number
@@ -124,7 +124,7 @@ def shape_colours(header: Header) -> np.ndarray:
 def _fixed_colours(scene: Scene, header: Header) -> np.ndarray:
     by_shape = shape_colours(header)
     colours = np.zeros((len(header.group), 3), dtype=np.float32)
-    for number, group in enumerate(scene.particles):
+    for number, group in enumerate(scene.groups):
         members = header.group == number
         if group.colour == "by_shape":
             colours[members] = by_shape[header.shape[members]]

@@ -28,22 +28,22 @@ class Field(NamedTuple):
     unit: str
     low: float
     high: float
-    values: Callable[[Header, Frame, np.ndarray], np.ndarray]  # of some particles
+    values: Callable[[Header, Frame, np.ndarray], np.ndarray]  # of particles by their ids
 
     def fractions(self, header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
-        """Where on the scale the particles ``members`` (k,) are, (k,), 0 at its low end and 1 at its high one."""
+        """Where on the scale the particles with the ids ``members`` (k,) are, (k,), 0 at its low end, 1 at its high."""
         return (self.values(header, frame, members) - self.low) / (self.high - self.low)
 
 
 def is_settled_by_frames(scene: Scene) -> bool:
     """Whether a scale of the scene depends on how its particles fare."""
-    return any(group.colour in _CHANGING and group.colour_range is None for group in scene.particles)
+    return any(group.colour in _CHANGING and group.colour_range is None for group in scene.groups)
 
 
 def field_of(kind: str, scene: Scene, header: Header, frames: Sequence[Frame]) -> Field:
     """The field of a colour such as by_speed; its scale is the scene's, or settled by some frames."""
     name, unit, values, scale = _FIELDS[kind]
-    ranges = (g.colour_range for g in scene.particles if g.colour == kind and g.colour_range)
+    ranges = (g.colour_range for g in scene.groups if g.colour == kind and g.colour_range)
     low, high = next(ranges, None) or scale(scene, header, frames)
     return Field(name, unit, float(low), float(high), values)
 
@@ -86,13 +86,12 @@ def _reached(
     values: Callable[[Header, Frame, np.ndarray], np.ndarray], header: Header, frames: Sequence[Frame]
 ) -> float:
     """What no more than the share _BEYOND of the particles at all times goes beyond; 0 if there are none."""
-    everyone = np.arange(len(header.size))
-    of_all = np.concatenate([values(header, frame, everyone) for frame in frames])
+    of_all = np.concatenate([values(header, frame, frame.ids) for frame in frames])
     return float(np.quantile(of_all, 1.0 - _BEYOND)) if len(of_all) else 0.0
 
 
 def _speeds(header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(frame.velocity[members], axis=1)
+    return np.linalg.norm(frame.velocity[frame.rows(members)], axis=1)
 
 
 def _speed_scale(scene: Scene, header: Header, frames: Sequence[Frame]) -> tuple[float, float]:
@@ -101,14 +100,14 @@ def _speed_scale(scene: Scene, header: Header, frames: Sequence[Frame]) -> tuple
 
 
 def _heights(header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
-    return frame.position[members, 2]
+    return frame.position[frame.rows(members), 2]
 
 
 def _height_scale(scene: Scene, header: Header, frames: Sequence[Frame]) -> tuple[float, float]:
     """From the bottom of the world to its top, or as far as all but a few ever are if it has neither [m]."""
-    if scene.world.boundary[2] != "open" or not len(header.size):
-        return -0.5 * scene.world.size[2], 0.5 * scene.world.size[2]
     heights = np.concatenate([frame.position[:, 2] for frame in frames])
+    if scene.world.boundary[2] != "open" or not len(heights):
+        return -0.5 * scene.world.size[2], 0.5 * scene.world.size[2]
     low, high = np.quantile(heights, (0.5 * _BEYOND, 1.0 - 0.5 * _BEYOND))
     return _rounded(float(low), float(high))
 
@@ -122,7 +121,7 @@ def _size_scale(scene: Scene, header: Header, frames: Sequence[Frame]) -> tuple[
 
 
 def _impacts(header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
-    return frame.impacts[members]
+    return frame.impacts[frame.rows(members)]
 
 
 def _impact_scale(scene: Scene, header: Header, frames: Sequence[Frame]) -> tuple[float, float]:

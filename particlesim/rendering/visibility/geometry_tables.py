@@ -46,6 +46,11 @@ def geometry_tables(header: Header) -> GeometryTables:
     return GeometryTables(stack_shapes(header.shapes), body, header.radius, inradius)
 
 
+def taken(tables: GeometryTables, rows: np.ndarray) -> GeometryTables:
+    """Some of the bodies of a table."""
+    return GeometryTables(tables.shapes, *(column[rows] for column in tables[1:]))
+
+
 def joined(some: GeometryTables, more: GeometryTables) -> GeometryTables:
     """The bodies of two tables that have the same shapes."""
     body, radius, inradius = (np.concatenate([a, b]) for a, b in zip(some[1:], more[1:], strict=True))

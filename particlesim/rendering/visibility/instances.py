@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.rendering.visibility.geometry_tables import GeometryTables
+from particlesim.rendering.visibility.geometry_tables import GeometryTables, taken
 from particlesim.scene import Scene
 from particlesim.trajectory.frame_aabb import frame_boxes
 from particlesim.trajectory.frames import Frame, Header
@@ -43,21 +43,23 @@ class Instances(NamedTuple):
 
 def instances_of(scene: Scene, header: Header, frame: Frame, tables: GeometryTables) -> Instances:
     """The bodies of a frame, and their images through the faces of a periodic world that they reach through."""
+    header, source = header.of(frame), ALL_BODIES if frame.present is None else frame.present
+    if frame.present is not None:
+        tables = taken(tables, frame.present)
     position, orientation = np.ascontiguousarray(frame.position), np.ascontiguousarray(frame.orientation)
     periodic = np.array(scene.world.boundary) == "periodic"
     if not periodic.any():
-        return Instances(position, orientation, tables)
+        return Instances(position, orientation, tables, source)
     size = np.asarray(scene.world.size)
     near = np.flatnonzero(((np.abs(position) + tables.radius[:, None] > 0.5 * size) & periodic).any(axis=1))
     boxes = frame_boxes(
         replace(header, shape=header.shape[near], size=header.size[near]),
-        replace(frame, position=position[near], orientation=orientation[near]),
+        replace(frame, position=position[near], orientation=orientation[near], present=None),
     )
     which, shift = images_of(*boxes, size, periodic)
-    source = np.concatenate([np.arange(len(position)), near[which]])
-    of_each = {name: getattr(tables, name)[source] for name in ("body", "radius", "inradius")}
+    rows = np.concatenate([np.arange(len(position)), near[which]])
     images = position[near[which]] + shift
-    return Instances(np.concatenate([position, images]), orientation[source], tables._replace(**of_each), source)
+    return Instances(np.concatenate([position, images]), orientation[rows], taken(tables, rows), frame.ids[rows])
 
 
 def images_of(
