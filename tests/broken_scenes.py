@@ -4,7 +4,9 @@
 WORLD = "[world]\nsize = [4.0, 4.0, 4.0]\n"
 GROUP = '[[particles]]\nshape = "sphere"\ncount = 10\nsize = 0.2\n'
 GOOD = WORLD + GROUP
-ALL_KEYS = "title, seed, duration, world, particles, emitters, sinks, obstacles, contact, solver, movie, camera, show"
+ALL_KEYS = (
+    "title, seed, duration, world, particles, emitters, sinks, obstacles, fields, contact, solver, movie, camera, show"
+)
 VECTOR = "must be a list of 3 finite numbers, [x, y, z]"
 COUNT = "must be a whole number from 0 to 100,000,000"
 SIZE = 'must be a number above 0, or a table such as { kind = "uniform", low = 0.1, high = 0.2 }'
@@ -91,10 +93,25 @@ BROKEN = [
         "sinks[0].region: every coordinate of lower must be below that of upper",
     ),
     (GOOD + "[[sinks]]\nrate = 1\n", "sinks[0].rate = 1: unknown key; allowed: name, region"),
+    (GOOD + '[[fields]]\nkind = "centre"\n', "fields[0].kind = \"centre\": unknown kind; did you mean 'central'?"),
+    (GOOD + '[[fields]]\nkind = "drag"\n', "fields[0]: the key 'coefficient' is missing"),
+    (
+        GOOD + '[[fields]]\nkind = "drag"\ncoefficient = 0\n',
+        "fields[0].coefficient = 0: must be a number above 0",
+    ),
     (obstacle('"plan"'), "obstacles[0].shape = \"plan\": unknown kind; did you mean 'plane'?"),
     (
         obstacle('{ kind = "plane", normal = [0, 0, 0] }'),
         "obstacles[0].shape.normal = [0, 0, 0]: must not be zero",
+    ),
+    (
+        world(boundary='"periodic"') + '[[obstacles]]\nshape = "cube"\nsize = 1.5\n',
+        "obstacles[0].size = 1.5: too large: it spans 2.598 m; in a periodic world it must span less than half of it",
+    ),
+    (
+        world(boundary='["wall", "periodic", "wall"]')
+        + '[[obstacles]]\nshape = { kind = "plane", normal = [0, 1, 1] }\n',
+        "obstacles[0].shape.normal = [0.0, 1.0, 1.0]: must be at right angles to the periodic axes",
     ),
     (obstacle(opacity="2"), "obstacles[0].opacity = 2: must be a number from 0 to 1"),
     (obstacle(name='"walls"'), 'obstacles[0].name = "walls": the walls have this name already'),

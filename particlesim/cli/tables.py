@@ -104,7 +104,7 @@ def print_summary(summary: Summary, path: Path) -> None:
     if waited:
         rows.append(("waited for room to come in", f"up to {waited:,} at a time"))
     if summary.work:
-        rows.append(("worked by obstacles", f"{summary.work:.3g} of all of it"))
+        rows.append(("worked by obstacles, fields", f"{summary.work:.3g} of all of it"))
     if not summary.obstructed:
         rows.append(("momentum not accounted for", f"{summary.momentum_error:.1e}"))
     rows.append(("largest overlap", f"{summary.largest_overlap:.1e} m"))

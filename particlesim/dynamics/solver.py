@@ -25,6 +25,7 @@ from particlesim.dynamics.events.collision_prediction import Predicted, bound_pa
 from particlesim.dynamics.events.event_queue import run_islands
 from particlesim.dynamics.events.islands import Islands, add_up, newly_touched, unite
 from particlesim.dynamics.events.paths import Paths, extended, forget, new_clocks, no_segments, rewind, with_room
+from particlesim.dynamics.kicks import Kicks
 from particlesim.dynamics.neighbour_list import (
     FindPairs,
     NeighbourList,
@@ -36,22 +37,19 @@ from particlesim.dynamics.neighbour_list import (
     sort_neighbours,
     write_skins,
 )
+from particlesim.dynamics.scales import periodic_room, set_tolerances, time_for
 from particlesim.dynamics.settings import (
-    APPROACH_TOLERANCE,
     ISLAND_COST,
     MAX_ISLAND_ROUNDS,
     MAX_SUBSTEP_BISECTIONS,
     MAX_SUBSTEP_DISPLACEMENT,
-    PENETRATION_SLOP,
-    PERIODIC_ROOM,
-    RESTING_PENETRATION_SLOP,
     SEARCHES_PER_SORT,
     STRAYED_SKIN,
     SUM_BLOCK,
 )
 from particlesim.dynamics.solver_state import FORCE, SEEN, Counts, SolverState
 from particlesim.model.prescribed_motion import changes_within, place_kinematic
-from particlesim.model.system import Model, System
+from particlesim.model.system import Model
 
 # What the computing time goes into.
 PHASES = ("pairs", "contacts", "respond", "advance")
@@ -74,6 +72,7 @@ class Solver:
         self._find_pairs = find_pairs
         self.counts = Counts(np.zeros(model.system.particles, dtype=np.int64))
         self.seconds = dict.fromkeys(PHASES, 0.0)
+        self.kicks = Kicks()
         self._take(model)
         self.state = self._begin(0.0) if state is None else state
 
@@ -81,14 +80,14 @@ class Solver:
         """Make room for the bodies of a model."""
         system = model.system
         self.model, self._system = model, system
-        _set_tolerances(system)
+        set_tolerances(system)
         self._resting = RestingContacts(system)
         self._clock = new_clocks(len(system.body))
         self._accumulator = np.zeros((system.particles, columns_needed(system)))
         self._friction = system.law if (system.law["friction"] > 0.0).any() else None
         self._bound = np.zeros(system.bounded, dtype=BOUND)  # scratch, by place
         self._segments = no_segments()  # scratch, with room for those of the substeps so far
-        self._periodic_room = _periodic_room(system)
+        self._periodic_room = periodic_room(system)
 
     def change_particles(self, particles: np.ndarray, origin: np.ndarray) -> None:
         """Let there be other particles from now on.
@@ -156,14 +155,14 @@ class Solver:
             lambda _, first, last: sum_speeds(system, SUM_BLOCK, sums, first, last), len(sums)
         )
         squares, falls = sums.sum(axis=0) / system.particles
-        longest = min(_time_for(displacement, math.sqrt(squares), falls), self._resting.longest_substep(self.state))
+        longest = min(time_for(displacement, math.sqrt(squares), falls), self._resting.longest_substep(self.state))
         return min(longest, self._periodic_limit(max(of_blocks)))
 
     def _periodic_limit(self, fastest: float) -> float:
         """In how long [s] two bodies that close in at twice the ``fastest`` speed [m/s] come near another image."""
         if self._periodic_room == math.inf:
             return math.inf
-        return _time_for(self._periodic_room, fastest, float(np.linalg.norm(self._system.domain[0]["gravity"])))
+        return time_for(self._periodic_room, fastest, float(np.linalg.norm(self._system.domain[0]["gravity"])))
 
     def step(self, duration: float) -> None:
         """Move all bodies on by ``duration`` [s], from one change of an obstacle's motion to the next."""
@@ -188,8 +187,19 @@ class Solver:
         if duration <= 0.0:
             return
         parts = max(1, math.ceil(duration / self.longest_substep(MAX_SUBSTEP_DISPLACEMENT) - 1e-9))
+        part = duration / parts
         for _ in range(parts):
-            self._substep(duration / parts)
+            self._kick(0.5 * part, backwards=False)
+            self._substep(part)
+            self._kick(0.5 * part, backwards=True)
+
+    def _kick(self, duration: float, backwards: bool) -> None:
+        """Let fields and other forces act on all particles in place (see kicks.py)."""
+        if not self.kicks.there_are(self.model):
+            return
+        self.counts.work += self.kicks.act(self.model, duration, backwards)
+        system, state = self._system, self.state
+        state.time_within_skins = time_within_skins(system, state.neighbours.reference, 0, system.bounded)
 
     @contextmanager
     def _spent_on(self, phase: str) -> Iterator[None]:
@@ -362,28 +372,3 @@ class Solver:
         counts.work += float(total[WORK:].sum())
         counts.wall_impulse += borne.wall_impulse
         counts.unresolved += unfinished > 0 or borne.unresolved
-
-
-def _set_tolerances(system: System) -> None:
-    """Set what counts as rest and as a touch in a domain: fractions of the speed of a fall through it, and of sizes."""
-    domain = system.domain[0]
-    gravity = domain["gravity"]
-    size = domain["upper"] - domain["lower"]
-    domain["rest_speed"] = APPROACH_TOLERANCE * math.sqrt(2.0 * float(np.abs(gravity) @ size))
-    loses = system.law["restitution"].min(initial=1.0) < 1.0
-    domain["penetration_slop"] = RESTING_PENETRATION_SLOP if gravity.any() and loses else PENETRATION_SLOP
-
-
-def _periodic_room(system: System) -> float:
-    """How far two bodies may both go on periodic axes [m] without coming near another image; inf without such axes."""
-    period, radius = system.domain[0]["period"], system.body["radius"][: system.bounded]
-    periods = period[period > 0.0]
-    if not len(periods) or not len(radius):
-        return math.inf
-    return max(PERIODIC_ROOM * (0.5 * periods.min() - 2.0 * radius.max()), 1e-3 * radius.min())
-
-
-def _time_for(distance: float, speed: float, acceleration: float) -> float:
-    """How long a distance takes from ``speed`` at ``acceleration``; inf without either."""
-    denominator = speed + math.sqrt(speed * speed + 2.0 * acceleration * distance)
-    return 2.0 * distance / denominator if denominator > 0.0 else math.inf

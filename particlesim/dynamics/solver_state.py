@@ -29,7 +29,7 @@ class Counts:
     wall_impulse: np.ndarray = field(default_factory=lambda: np.zeros(6))  # outward, on each wall [N s]
     wall_shear: np.ndarray = field(default_factory=lambda: np.zeros((6, 3)))  # and along it, a vector
     dissipated: np.ndarray = field(default_factory=lambda: np.zeros(len(DISSIPATION)))  # by cause [J]
-    work: float = 0.0  # that obstacles did by moving [J]
+    work: float = 0.0  # that obstacles did by moving, and fields [J]
     pairs_tested: int = 0  # boxes compared by the broad phase
     candidate_pairs: int = 0  # pairs it found
     unresolved: int = 0  # substeps in which more happened than was worked through (see MAX_IMPACTS)

@@ -116,7 +116,8 @@ def summary_of(scene: Scene, header: Header) -> Summary:
     """The summary of a run of a scene, before its first frame."""
     laws = contact_laws_of(scene)
     elastic = bool((laws["restitution"] == 1.0).all() and (laws["friction"] == 0.0).all())
-    return Summary(float(header.mass.sum()), scene.world.gravity, elastic, bool(scene.obstacles) or scene.is_open)
+    forced = bool(scene.obstacles or scene.fields) or scene.is_open
+    return Summary(float(header.mass.sum()), scene.world.gravity, elastic, forced)
 
 
 def timed(summary: Summary, name: str, passing: Iterable[_T]) -> Iterator[_T]:

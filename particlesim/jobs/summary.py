@@ -15,8 +15,8 @@ class Summary:
     """Gathers frames as they pass: ``add`` each, then read the attributes.
 
     Energies are compared with what there was at first, or with the largest kinetic energy seen if that is more.
-    ``elastic`` says that no impact may take energy, ``obstructed`` that there are obstacles, or that particles
-    come and go.
+    ``elastic`` says that no impact may take energy, ``obstructed`` that there are obstacles or fields, or that
+    particles come and go.
     """
 
     def __init__(self, total_mass: float, gravity: Any, elastic: bool = True, obstructed: bool = False) -> None:

@@ -10,6 +10,7 @@ from particlesim.core.records import cache_aligned
 from particlesim.geometry.shape_table import ShapeTable
 from particlesim.geometry.shapes import Shape
 from particlesim.model.bodies import BODY
+from particlesim.model.fields import FIELD
 
 
 class System(NamedTuple):
@@ -35,6 +36,7 @@ class Model(NamedTuple):
     restitution: np.ndarray  # (m,) of each material
     system: System
     obstacle_shapes: tuple[Shape, ...] = ()  # that the scene's obstacles are drawn as, in their order
+    fields: np.ndarray = np.zeros(0, dtype=FIELD)  # (f,) FIELD
     population: np.ndarray = np.zeros(0, dtype=BODY)  # (m,) BODY, all particles that there ever are, if some come or go
 
     @property

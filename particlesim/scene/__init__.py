@@ -13,6 +13,7 @@ from pydantic import Field, ValidationError, model_validator
 from particlesim.scene.base import MAX_COUNT, Model, PlainFloat, Text, whole
 from particlesim.scene.camera import Camera, FixedCamera, Movie, Show
 from particlesim.scene.errors import SceneError
+from particlesim.scene.fields import ForceField
 from particlesim.scene.flow import Emitter, Sink
 from particlesim.scene.groups import Group
 from particlesim.scene.messages import hint, must_be, shown
@@ -36,6 +37,7 @@ class Scene(Model):
     emitters: list[Emitter] = Field(default_factory=list)
     sinks: list[Sink] = Field(default_factory=list)
     obstacles: list[Obstacle] = Field(default_factory=list)
+    fields: list[ForceField] = Field(default_factory=list)
     contact: list[Contact] = Field(default_factory=list)
     solver: Solver = Field(default_factory=Solver)
     movie: Movie = Field(default_factory=Movie)

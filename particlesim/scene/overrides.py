@@ -10,6 +10,7 @@ from particlesim.scene.base import MAX_COUNT, Model
 from particlesim.scene.file import SceneError, parse_scene
 from particlesim.scene.flow import Emitter
 from particlesim.scene.groups import Group, ListPlacement
+from particlesim.scene.obstacles import Obstacle
 from particlesim.scene.surface import Contact
 from particlesim.scene.world import World
 
@@ -59,7 +60,7 @@ def scaled(scene: Scene, factor: float) -> Scene:
     """A twin of the scene with ``factor`` times as many particles that fill the same part of the world.
 
     Emitters go ``factor`` times as fast. Sizes, the spacing of lattices and rolling friction are multiplied by
-    factor^(-1/3); a given mass and temperatures by 1 / factor, so that density, speeds, energy and pressure stay.
+    factor^(-1/3); a given mass, temperatures and drag by 1 / factor, so that density, speeds, energy and pressure stay.
     Particles of a list stay as they are. SceneError if there are no others, or too many.
     """
     counted = [group for group in scene.groups if not isinstance(group.placement, ListPlacement)]
@@ -76,6 +77,8 @@ def scaled(scene: Scene, factor: float) -> Scene:
             [group if isinstance(group.placement, ListPlacement) else _scaled(group, factor) for group in scene.groups],
         ),
         contact=[_rolling(contact, factor) for contact in scene.contact],
+        obstacles=[_rolling(obstacle, factor) for obstacle in scene.obstacles],
+        fields=[_times(field, 1.0 / factor, "coefficient") for field in scene.fields],
     )
 
 
@@ -90,7 +93,7 @@ def _length(factor: float) -> float:
     return factor ** (-1.0 / 3.0)
 
 
-def _rolling(table: World | Contact, factor: float) -> Any:
+def _rolling(table: World | Contact | Obstacle, factor: float) -> Any:
     """A table whose rolling friction, if there is any, is that of a twin."""
     return _times(table, _length(factor), "rolling_friction") if table.rolling_friction else table
 

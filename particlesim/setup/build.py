@@ -23,6 +23,7 @@ from particlesim.scene import Scene
 from particlesim.scene.file import SceneError
 from particlesim.scene.groups import FixedSize, Group, ListPlacement
 from particlesim.scene.surface import WALLS
+from particlesim.setup.fields import fields_of
 from particlesim.setup.initial_motion import random_quaternions, set_in_motion
 from particlesim.setup.obstacles import Obstacle, obstruct
 from particlesim.setup.orientations import of_body_axes, quaternion_of
@@ -60,7 +61,7 @@ def build(scene: Scene, obstacles: Sequence[Obstacle] = ()) -> Model:
     _check_volume(scene, domain[0], shapes, particles)
     own = obstacles_of(scene)
     model = assemble(shapes, particles, domain, materials_of(scene), [*own, *obstacles], pair_laws_of(scene))
-    model = model._replace(obstacle_shapes=drawn_shapes(scene, own))
+    model = model._replace(obstacle_shapes=drawn_shapes(scene, own), fields=fields_of(scene))
     set_in_motion(scene, to_come, randoms)
     crowd = Crowd(*(np.ascontiguousarray(particles[name]) for name in ("shape_row", "group", "scale", "radius")))
     particles = model.particles

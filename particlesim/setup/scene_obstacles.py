@@ -13,6 +13,7 @@ from particlesim.core.rotations import rotations_of
 from particlesim.geometry.shapes import Shape, drawn_hull, half_space
 from particlesim.model.materials import Material
 from particlesim.scene import Scene
+from particlesim.scene.file import SceneError
 from particlesim.scene.obstacles import KeysMotion, Motion, PlaneShape, SpinMotion, VibrateMotion
 from particlesim.setup.obstacles import Obstacle, Piece, poses_at
 from particlesim.setup.orientations import of_body_axes, quaternion_of
@@ -54,6 +55,7 @@ def _obstacle(scene: Scene, k: int, known: Shape | None) -> Obstacle:
     else:
         shape = known or shape_of(said.shape, f"obstacles[{k}].shape")
     orientation = of_body_axes(quaternion_of(said.orientation), shape)
+    _check_period(scene, k, shape, orientation)
     obstacle = Obstacle(
         shape,
         said.position,
@@ -63,6 +65,18 @@ def _obstacle(scene: Scene, k: int, known: Shape | None) -> Obstacle:
         surface_velocity=said.surface_velocity or (0.0, 0.0, 0.0),
     )
     return obstacle if said.motion is None else obstacle._replace(pieces=_pieces(obstacle, said.motion))
+
+
+def _check_period(scene: Scene, k: int, shape: Shape, orientation: np.ndarray) -> None:
+    """A particle must not meet an obstacle round a periodic domain as well: SceneError."""
+    said, key = scene.obstacles[k], f"obstacles[{k}]"
+    period = np.array(scene.world.period)
+    if isinstance(said.shape, PlaneShape):
+        if (np.abs(rotations_of(orientation).apply(shape.face_normals[0]))[period > 0.0] > 1e-12).any():
+            raise SceneError("must be at right angles to the periodic axes", f"{key}.shape.normal", said.shape.normal)
+    elif (widest := 2.0 * shape.radius * said.size) >= 0.5 * min(period[period > 0.0], default=math.inf):
+        span = f"it spans {widest:.4g} m; in a periodic world it must span less than half of it"
+        raise SceneError(f"too large: {span}", f"{key}.size", said.size)
 
 
 def _unit(vector: Any) -> np.ndarray:

@@ -59,6 +59,7 @@ def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
     arrays |= {f"counts.{name}": np.asarray(value) for name, value in asdict(counts).items()}
     arrays |= {f"flow.{name}": array for name, array in flow.arrays().items()}
     arrays["restitution"], arrays["population"] = model.restitution, model.population
+    arrays["fields"] = model.fields
     arrays["text"] = np.frombuffer(json.dumps(text).encode(), dtype=np.uint8)
     with atomic_write(path) as hidden, open(hidden, "wb") as file:
         np.savez(file, **arrays)
@@ -89,7 +90,7 @@ def _assembled(text: dict[str, Any], arrays: dict[str, np.ndarray]) -> Checkpoin
     arrays["system.body"] = cache_aligned(arrays["system.body"])
     system = System(table, particles=text["particles"], bounded=text["bounded"], **_under("system.", arrays))
     shapes, drawn = (tuple(_shape(each) for each in text[key]) for key in ("shapes", "obstacle_shapes"))
-    model = Model(shapes, arrays["restitution"], system, drawn, arrays["population"])
+    model = Model(shapes, arrays["restitution"], system, drawn, arrays["fields"], arrays["population"])
     counted = _under("counts.", arrays)
     counts = Counts(**{f.name: _plain(counted[f.name]) for f in fields(Counts)})
     state = SolverState.of_arrays(_under("state.", arrays))

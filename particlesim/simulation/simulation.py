@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -162,6 +163,31 @@ class Simulation:
             if changed is not None:
                 self._solver.change_particles(*changed)
         self.steps += 1
+
+    def add_force(self, force: Callable[[Particles], np.ndarray]) -> None:
+        """Let a force act on the particles from now on, in kicks between their free paths.
+
+        A checkpoint does not hold it: after ``load`` it is to be added again.
+
+        Parameters
+        ----------
+        force : callable
+            Takes the particles as they are and returns the force on each, (n, 3) [N].
+
+        Raises
+        ------
+        ValueError
+            When a step is made, if what it returns is not (n, 3) finite numbers.
+        """
+
+        def checked() -> np.ndarray:
+            found = np.asarray(force(self.particles), dtype=np.float64)
+            expected = (self.model.system.particles, 3)
+            if found.shape != expected or not np.isfinite(found).all():
+                raise ValueError(f"force must return finite numbers of the shape {expected}, not {found.shape}")
+            return found
+
+        self._solver.kicks.forces.append(checked)
 
     # ---- looking ---------------------------------------------------------------------------------------------------
 

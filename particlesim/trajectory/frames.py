@@ -34,7 +34,7 @@ class Ledger:
     largest_overlap: float | None = None  # of two particles, or of one and a wall [m]; only recorded frames have it
     dissipated: np.ndarray | None = None  # (4,) by the causes in DISSIPATION [J]; older files do not have it
     wall_shear: np.ndarray | None = None  # (6, 3) given to the walls across their normals [N s]; nor this
-    work: float | None = None  # that moving obstacles did in impacts [J]; nor this
+    work: float | None = None  # that moving obstacles did in impacts, and fields [J]; nor this
     flow_mass: np.ndarray | None = None  # (2,) of particles that came and that went [kg]; nor this and what follows
     flow_energy: np.ndarray | None = None  # (2,) kinetic and potential energy that they had then [J]
     released: int | None = None  # particles that emitters put in
@@ -59,7 +59,7 @@ class Ledger:
 
     @property
     def own_energy(self) -> float:
-        """Kinetic and potential energy less what moving obstacles worked and what came with particles [J]."""
+        """Kinetic and potential energy less what obstacles and fields worked and what came with particles."""
         came, went = (0.0, 0.0) if self.flow_energy is None else self.flow_energy.tolist()
         return self.energy - (self.work or 0.0) - came + went
 
