@@ -6,6 +6,7 @@ import pytest
 from PIL import Image
 
 import particlesim as ps
+from particlesim.rendering.regions import region_lines
 from particlesim.trajectory.gsd_file import Trajectory
 from tests.worlds import listed, scene
 
@@ -150,6 +151,14 @@ def test_a_movie_shows_those_that_are_there(tmp_path):
     a, b, c = (np.asarray(Image.open(tmp_path / f"{name}.png")).astype(int) for name in "abc")
     assert (np.abs(a - b).max(axis=2) > 8).mean() < 0.01
     assert (np.abs(a - c).max(axis=2) > 8).mean() > 0.01
+
+
+def test_drafts_show_regions_within_the_world():
+    lines = region_lines(fountain(), 1.0)
+    assert lines.shape == (3 * 12, 11)
+    ends = np.concatenate([lines[:, :3], lines[:, 4:7]])
+    assert np.abs(ends).max() == 2.0
+    assert (ends[:, 2].min(), ends[:, 2].max()) == (-2.0, 1.5)
 
 
 def test_a_scene_of_emitters_alone_begins_empty():

@@ -13,6 +13,7 @@ from particlesim.rendering.hud.overlay import Overlay
 from particlesim.rendering.look import Look
 from particlesim.rendering.octree_cells import cell_lines, octree_cells
 from particlesim.rendering.quality import PRESETS
+from particlesim.rendering.regions import region_lines
 from particlesim.rendering.scenery import Scenery
 from particlesim.rendering.shading.ambient_occlusion import AmbientOcclusion
 from particlesim.rendering.shading.environment import Environment
@@ -150,10 +151,12 @@ class Renderer:
         return np.ones((2, 2) if self._environment.has_floor else (0, 0), dtype=np.float32)
 
     def _put_lines(self, view: View, frame: Frame) -> None:
-        """The edges of the world and, if they are shown, of the octree's cells."""
+        """The edges of the world, of regions in drafts and, if they are shown, of the octree's cells."""
         scene = self._look.scene
         width = self._quality.samples * max(1.0, self._size[1] / 720.0)
         rows = [self._environment.box_lines(view, _BOX_LINE * width)]
+        if scene.movie.quality == "draft" and scene.is_open:
+            rows.append(region_lines(scene, width=_CELL_LINE * width))
         if scene.show.cells:
             cells = octree_cells(scene, frame)
             rows.insert(0, cell_lines(*cells, width=_CELL_LINE * width, begin=self._look.colours.begin))
