@@ -99,7 +99,7 @@ def test_other_files_are_refused_in_one_line(tmp_path):
         Trajectory(tmp_path / "text.gsd")
     with gsd.hoomd.open(str(tmp_path / "other.gsd"), "w") as file:
         file.append(gsd.hoomd.Frame())
-    with pytest.raises(TrajectoryError, match="not written by particlesim"):
+    with pytest.raises(TrajectoryError, match="has no frames"):
         Trajectory(tmp_path / "other.gsd")
     with gsd.hoomd.open(str(tmp_path / "old.gsd"), "w") as file:
         frame = gsd.hoomd.Frame()

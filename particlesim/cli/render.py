@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -67,7 +68,7 @@ def render(
     with (
         one_line_errors(source),
         place_for(output, source, *suffixes) as path,
-        _opened(source, options) as (subject, scene, total),
+        _opened(source, options, quiet) as (subject, scene, total),
     ):
         time = still_time(scene.duration, options)
         if time is not None and resume:
@@ -83,10 +84,11 @@ def render(
 
 
 @contextmanager
-def _opened(source: Path, options: RenderOptions) -> Iterator[tuple[Scene | Trajectory, Scene, int]]:
+def _opened(source: Path, options: RenderOptions, quiet: bool) -> Iterator[tuple[Scene | Trajectory, Scene, int]]:
     """What to make a movie of, the scene as it is to be drawn, and how many frames there are.
 
-    SceneError or TrajectoryError if the source cannot be read, OptionError for a value that is not allowed.
+    What is assumed of a trajectory that another program wrote is printed, if not ``quiet``. SceneError or
+    TrajectoryError if the source cannot be read, OptionError for a value that is not allowed.
     """
     if source.suffix.lower() != ".gsd":
         scene = scene_as_asked(load(source), options, of_trajectory=False)
@@ -95,4 +97,6 @@ def _opened(source: Path, options: RenderOptions) -> Iterator[tuple[Scene | Traj
     from particlesim.trajectory.gsd_file import Trajectory  # noqa: PLC0415
 
     with Trajectory(source) as trajectory:
+        for line in () if quiet else trajectory.assumed:
+            print(f"{source}: assumed: {line}", file=sys.stderr)
         yield trajectory, scene_as_asked(trajectory.scene, options, of_trajectory=True), len(trajectory)

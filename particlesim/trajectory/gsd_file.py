@@ -24,6 +24,7 @@ from particlesim.geometry.convex_hull import hull_polygons
 from particlesim.geometry.shapes import Shape, capsule, drawn_hull, principal_hull, sphere
 from particlesim.scene import Scene
 from particlesim.scene.file import stored_scene
+from particlesim.trajectory.foreign_gsd import FRAME_RATE, Foreign, check_same_particles, read_foreign
 from particlesim.trajectory.frames import Frame, Header, Ledger
 from particlesim.trajectory.gsd_chunks import Chunks, TrajectoryError, cut, reading
 
@@ -124,18 +125,23 @@ class TrajectoryWriter:
 
 
 class Trajectory:
-    """A GSD file written by particlesim: a sequence of frames. A context manager. TrajectoryError if it is not one."""
+    """A GSD file: a sequence of frames. A context manager. TrajectoryError if it is none, or damaged.
+
+    Of files that other programs wrote, such as HOOMD-blue, ``assumed`` says line by line what they leave open.
+    """
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._chunks = chunks = Chunks(self.path)
         try:
             with reading(self.path):
-                if not chunks.frames or not chunks.has(_LOG + "scene"):
-                    raise TrajectoryError(f"{path}: not written by particlesim, or without frames")
-                if not all(chunks.has(name) for name in (_IMPACTS, *_ledger_names())):
+                if not chunks.frames:
+                    raise TrajectoryError(f"{path}: has no frames")
+                self._is_own = chunks.has(_LOG + "scene")
+                if self._is_own and not all(chunks.has(name) for name in (_IMPACTS, *_ledger_names())):
                     raise TrajectoryError(f"{path}: {_OLDER}")
-                self.header = _checked(_read_header(chunks))
+                found = Foreign(_read_header(chunks), ()) if self._is_own else read_foreign(chunks)
+                self.header, self.assumed = _checked(found.header), found.assumed
         except BaseException:
             chunks.close()
             raise
@@ -172,6 +178,8 @@ class Trajectory:
     def time(self, k: int) -> float:
         """The time of frame ``k`` [s]."""
         with reading(self.path):
+            if not self._is_own:
+                return k / FRAME_RATE
             return float(self._chunks.rows(_LOG + "time", 1, (0.0,), k)[0, 0])
 
     def __getitem__(self, k: int) -> Frame:
@@ -179,6 +187,8 @@ class Trajectory:
         if not 0 <= k < len(self):
             raise IndexError(k)
         with reading(self.path):
+            if not self._is_own:
+                check_same_particles(self._chunks, self.header, k)
             present = self._chunks.read(_ID, k).astype(np.int64) if self._chunks.has(_ID) else None
             count = len(self.header.shape) if present is None else len(present)
             if present is not None and ((present >= len(self.header.shape)).any() or (np.diff(present) <= 0).any()):
@@ -196,7 +206,7 @@ class Trajectory:
                 angular_momentum=_world_momentum(each["angmom"], each["orientation"]),
                 image=each["image"].astype(np.int64),
                 impacts=self._chunks.rows(_IMPACTS, count, (0.0,), k)[:, 0].astype(np.int64),
-                ledger=_read_ledger(self._chunks, k),
+                ledger=_read_ledger(self._chunks, k) if self._is_own else None,
                 present=present,
             )
 
