@@ -87,6 +87,9 @@ def _private_folder(folder: Path) -> Path:
 
 CACHE_FOLDER = _cache_folder()
 
+# Processes that compile into it beside each other lock its functions here.
+_LOCKS = Path(CACHE_FOLDER, "compiling")
+
 
 def is_compiled(module: str) -> bool:
     """Whether there are compiled kernels of a module of this package, named from below it, as it is now."""
@@ -131,13 +134,12 @@ def _role(kind: Any) -> Any:
 def _compile_once_a_role(dispatcher: Any) -> None:
     """Keep numba from compiling a function anew for each constant that it is called with."""
     compile_as_typed = dispatcher.compile
-    lock_file = Path(CACHE_FOLDER, "compiling")
 
     def compile_once(signature: Any) -> Any:
         roles = tuple(_role(kind) for kind in signature)
         if roles in dispatcher.overloads:
             return compile_as_typed(roles)
-        with global_compiler_lock, _rare_collections(), compiled_here(lock_file, dispatcher.py_func):
+        with global_compiler_lock, _rare_collections(), compiled_here(_LOCKS, dispatcher.py_func):
             return compile_as_typed(roles)
 
     dispatcher.compile = compile_once

@@ -30,8 +30,7 @@ def overlaps_any(shapes, a, point, others, period, points):
         b = others[k]
         offset = nearest_image(sub(to_vec3(b.position), point), period)
         reach = a.radius + b.radius
-        near = dot(offset, offset) <= reach * reach
-        if near and pair_separation(shapes, placed_a, placed(b), offset, NO_SIMPLEX, points)[0] <= 0.0:
+        if dot(offset, offset) <= reach * reach and pair_overlaps(shapes, placed_a, placed(b), offset, points):
             return True
     return False
 

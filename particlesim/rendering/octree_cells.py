@@ -20,11 +20,10 @@ def cell_lines(lower: np.ndarray, upper: np.ndarray, depth: np.ndarray, width: f
 
     ``begin``: see ``map_colours``.
     """
-    start, end = geometry.box_edges(np.asarray(lower), np.asarray(upper))
     colour = np.empty((len(depth), 4))
     colour[:, :3] = map_colours(np.asarray(depth) / _DEEPEST, begin)
     colour[:, 3] = 0.35
-    return geometry.lines(start.reshape(-1, 3), end.reshape(-1, 3), np.repeat(colour, 12, axis=0), width)
+    return geometry.box_lines(np.asarray(lower), np.asarray(upper), np.repeat(colour, 12, axis=0), width)
 
 
 def octree_cells(scene: Scene, frame: Frame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

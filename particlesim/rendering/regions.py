@@ -18,6 +18,4 @@ def region_lines(scene: Scene, width: float) -> np.ndarray:
     half = 0.5 * np.asarray(scene.world.size)
     lower = np.clip(np.array([region.lower for region in regions]).reshape(-1, 3), -half, half)
     upper = np.clip(np.array([region.upper for region in regions]).reshape(-1, 3), -half, half)
-    start, end = geometry.box_edges(lower, upper)
-    edges = np.repeat(np.array(colours).reshape(-1, 4), 12, axis=0)
-    return geometry.lines(start.reshape(-1, 3), end.reshape(-1, 3), edges, width)
+    return geometry.box_lines(lower, upper, np.repeat(np.array(colours).reshape(-1, 4), 12, axis=0), width)

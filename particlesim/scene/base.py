@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -97,6 +98,14 @@ class Timed(create_model("Span", __base__=Model, **_SPAN)):  # type: ignore[misc
     def begin(self) -> float:
         """When it begins [s]."""
         return float(getattr(self, "from"))
+
+
+def in_time(keys: list[Any]) -> list[Any]:
+    """The keys of a path. ValueError if their times do not grow."""
+    for before, after in itertools.pairwise(keys):
+        if after.time <= before.time:
+            raise ValueError(f"times must grow from key to key, but {after.time:g} follows {before.time:g}")
+    return keys
 
 
 # The folder that paths in a scene start at; None for a scene that was stored, whose files need not be there any more.

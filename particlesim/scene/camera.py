@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, Self, get_args
 
@@ -19,6 +18,7 @@ from particlesim.scene.base import (
     Positive,
     PositiveNumber,
     Vector,
+    in_time,
     shorthand,
     whole,
 )
@@ -98,18 +98,11 @@ class CameraKey(_Placed):
     time: Finite  # [s]
 
 
-def _in_time(keys: list[CameraKey]) -> list[CameraKey]:
-    for before, after in itertools.pairwise(keys):
-        if after.time <= before.time:
-            raise ValueError(f"times must grow from key to key, but {after.time:g} follows {before.time:g}")
-    return keys
-
-
 class PathCamera(Model):
     """Moves smoothly from key to key, at rest before the first and after the last."""
 
     kind: Literal["path"]
-    keys: Annotated[list[CameraKey], Field(min_length=1), AfterValidator(_in_time)]
+    keys: Annotated[list[CameraKey], Field(min_length=1), AfterValidator(in_time)]
 
 
 _Cameras = Annotated[FixedCamera | LookAtCamera | OrbitCamera | PathCamera, Field(discriminator="kind")]

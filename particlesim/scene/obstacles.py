@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
@@ -17,6 +16,7 @@ from particlesim.scene.base import (
     Text,
     Timed,
     Vector,
+    in_time,
     shorthand,
 )
 from particlesim.scene.groups import Orientation, Shapes, not_zero
@@ -76,13 +76,6 @@ class MotionKey(Model):
     orientation: Orientation | None = None  # likewise
 
 
-def _in_time(keys: list[MotionKey]) -> list[MotionKey]:
-    for before, after in itertools.pairwise(keys):
-        if after.time <= before.time:
-            raise ValueError(f"times must grow from key to key, but {after.time:g} follows {before.time:g}")
-    return keys
-
-
 class KeysMotion(Model):
     """From key to key: it sets off gently and arrives gently, and turns evenly. At rest before the first and the last.
 
@@ -90,7 +83,7 @@ class KeysMotion(Model):
     """
 
     kind: Literal["keys"]
-    keys: Annotated[list[MotionKey], Field(min_length=1), AfterValidator(_in_time)]
+    keys: Annotated[list[MotionKey], Field(min_length=1), AfterValidator(in_time)]
 
 
 Motion = Annotated[SpinMotion | VibrateMotion | TranslateMotion | KeysMotion, Field(discriminator="kind")]

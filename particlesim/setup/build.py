@@ -28,7 +28,7 @@ from particlesim.setup.initial_motion import random_quaternions, set_in_motion
 from particlesim.setup.obstacles import Obstacle, obstruct
 from particlesim.setup.orientations import of_body_axes, quaternion_of
 from particlesim.setup.placement import positions, unit_hint
-from particlesim.setup.scene_obstacles import drawn_shapes, obstacle_materials, obstacles_of
+from particlesim.setup.scene_obstacles import drawn_shapes, material_of, obstacles_of
 from particlesim.setup.shape_reading import shape_of
 from particlesim.setup.space import Crowd, Space
 
@@ -106,13 +106,14 @@ def assemble(
 
 def materials_of(scene: Scene) -> list[Material]:
     """The material of the walls, then that of each group."""
-    usual = scene.world.surface
-    return [Material(**usual), *(Material(**{**usual, **group.surface}) for group in scene.groups)]
+    return [material_of(scene, said) for said in (scene.world, *scene.groups)]
 
 
 def contact_laws_of(scene: Scene) -> np.ndarray:
     """The contact laws of a scene's walls, groups and obstacles, (m, m) CONTACT_LAW."""
-    return contact_laws([*materials_of(scene), *obstacle_materials(scene)], pair_laws_of(scene))
+    return contact_laws(
+        [*materials_of(scene), *(material_of(scene, said) for said in scene.obstacles)], pair_laws_of(scene)
+    )
 
 
 def pair_laws_of(scene: Scene) -> list[PairLaw]:

@@ -15,10 +15,11 @@ import numpy as np
 
 from particlesim.core.constants import MAX_MANIFOLD
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
-from particlesim.core.math3d import dot, sub, to_quat, to_vec3
+from particlesim.core.math3d import dot, sub, to_vec3
 from particlesim.core.records import record
 from particlesim.geometry.narrow_phase.pair import pair_overlaps
 from particlesim.geometry.support import is_sphere
+from particlesim.model.bodies import placed
 from particlesim.model.domain import nearest_image
 from particlesim.model.overlap import overlaps_any
 from particlesim.setup.space import Crowd, Space
@@ -150,8 +151,7 @@ def _overlap(table, a, b, offset, points):
     """Whether two particles whose bounding spheres overlap do; the centroid of b is at ``offset`` from that of a."""
     if is_sphere(table, a.shape_row) and is_sphere(table, b.shape_row):
         return True
-    placed_a, placed_b = (a.shape_row, a.scale, to_quat(a.orientation)), (b.shape_row, b.scale, to_quat(b.orientation))
-    return pair_overlaps(table, placed_a, placed_b, offset, points)
+    return pair_overlaps(table, placed(a), placed(b), offset, points)
 
 
 @kernel

@@ -15,6 +15,7 @@ from particlesim.model.materials import Material
 from particlesim.scene import Scene
 from particlesim.scene.file import SceneError
 from particlesim.scene.obstacles import KeysMotion, Motion, PlaneShape, SpinMotion, VibrateMotion
+from particlesim.scene.surface import HasSurface
 from particlesim.setup.obstacles import Obstacle, Piece, poses_at
 from particlesim.setup.orientations import of_body_axes, quaternion_of
 from particlesim.setup.shape_reading import shape_of
@@ -35,9 +36,9 @@ def obstacles_of(scene: Scene, shapes: Sequence[Shape] | None = None) -> list[Ob
     return [_obstacle(scene, k, shape) for k, shape in enumerate(known)]
 
 
-def obstacle_materials(scene: Scene) -> list[Material]:
-    """The material of each obstacle of a scene."""
-    return [Material(**{**scene.world.surface, **obstacle.surface}) for obstacle in scene.obstacles]
+def material_of(scene: Scene, said: HasSurface) -> Material:
+    """The material of what has a surface in a scene: as the world says where it says nothing itself."""
+    return Material(**{**scene.world.surface, **said.surface})
 
 
 def drawn_shapes(scene: Scene, obstacles: list[Obstacle]) -> tuple[Shape, ...]:
@@ -61,7 +62,7 @@ def _obstacle(scene: Scene, k: int, known: Shape | None) -> Obstacle:
         said.position,
         _tuple(orientation),
         said.size,
-        obstacle_materials(scene)[k],
+        material_of(scene, said),
         surface_velocity=said.surface_velocity or (0.0, 0.0, 0.0),
     )
     return obstacle if said.motion is None else obstacle._replace(pieces=_pieces(obstacle, said.motion))

@@ -13,7 +13,7 @@ from particlesim.scene import Scene
 from particlesim.scene.file import SceneError
 from particlesim.scene.flow import Emitter
 from particlesim.scene.groups import RandomPlacement, Region
-from particlesim.setup.build import build_domain, space_of
+from particlesim.setup.build import space_of
 from particlesim.setup.placement import Trials, from_middle
 from particlesim.simulation.conserved import conserved
 
@@ -51,7 +51,7 @@ class Flow:
     """
 
     def __init__(self, scene: Scene, model: Model, state: FlowState | None = None) -> None:
-        self._scene, self._world = scene, space_of(build_domain(scene))
+        self._scene, self._world = scene, space_of(model.system.domain)
         # The ids of an emitter's particles follow each other.
         counts = [emitter.number for emitter in scene.emitters]
         self._first = len(model.population) - sum(counts) + np.cumsum(counts, dtype=np.int64) - counts

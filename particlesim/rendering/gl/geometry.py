@@ -23,6 +23,12 @@ def lines(start: np.ndarray, end: np.ndarray, colour: np.ndarray, width: float) 
     return np.hstack([start, np.full((len(start), 1), width), end, colour]).astype(np.float32)
 
 
+def box_lines(lower: np.ndarray, upper: np.ndarray, colour: np.ndarray, width: float) -> np.ndarray:
+    """The edges of boxes ``lower`` .. ``upper`` (k, 3) [m] as ``lines``; ``colour`` (12 k, 4), that of each edge."""
+    start, end = box_edges(lower, upper)
+    return lines(start.reshape(-1, 3), end.reshape(-1, 3), colour, width)
+
+
 def edge_opacity(lower: np.ndarray, upper: np.ndarray, eye: np.ndarray) -> np.ndarray:
     """Opacity (12,) of the edges of a box seen from ``eye``: those in front of what it holds are fainter."""
     start, end = (ends[0] for ends in box_edges(lower[None], upper[None]))

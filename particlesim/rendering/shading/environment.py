@@ -60,7 +60,6 @@ class Environment:
         if not self._scene.box_shown:
             return np.zeros((0, 11), dtype=np.float32)
         upper = 0.5 * self._size
-        start, end = (ends[0] for ends in geometry.box_edges(-upper[None], upper[None]))
         colour = np.full((12, 4), 0.75 if self.dark else 0.25)
         colour[:, 3] = 0.7 * geometry.edge_opacity(-upper, upper, view.pose[:3, 3])
-        return geometry.lines(start, end, colour, width)
+        return geometry.box_lines(-upper[None], upper[None], colour, width)

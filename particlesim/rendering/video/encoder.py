@@ -54,7 +54,7 @@ class Encoder:
     def __init__(self, path: Path, fps: float, size: tuple[int, int], crf: int) -> None:
         self._size = size
         command = _command(path, fps, size, crf)
-        self._log = tempfile.TemporaryFile()  # noqa: SIM115  (closed in __exit__)
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115  (closed in close)
         # A session of its own: Ctrl-C is for us to handle, and ends ffmpeg from here.
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=self._log, stderr=self._log, start_new_session=True
