@@ -7,10 +7,16 @@ import trimesh
 
 import particlesim as ps
 from particlesim.setup.build import build
-from tests.broken_scenes import BROKEN, GOOD, group, world
+from tests.broken_scenes import BROKEN
+from tests.broken_surroundings import BROKEN_SURROUNDINGS
+from tests.scene_texts import GOOD, group, world
+
+each_broken_scene = pytest.mark.parametrize(
+    ("text", "line"), [pytest.param(*case, id=case[1][:60]) for case in BROKEN + BROKEN_SURROUNDINGS]
+)
 
 
-@pytest.mark.parametrize(("text", "line"), BROKEN, ids=[line[:60] for _, line in BROKEN])
+@each_broken_scene
 def test_a_broken_scene_gets_this_line(text, line, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(text)
@@ -20,7 +26,7 @@ def test_a_broken_scene_gets_this_line(text, line, tmp_path, monkeypatch):
     assert str(error) == f"scene.toml: {line}"
 
 
-@pytest.mark.parametrize(("text", "line"), BROKEN, ids=[line[:60] for _, line in BROKEN])
+@each_broken_scene
 def test_from_python_it_is_the_same_line(text, line):
     if not text or line.startswith("not valid TOML"):
         return

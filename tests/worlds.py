@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,18 @@ def scene(*groups: dict[str, Any], size: Any = (20.0, 20.0, 20.0), step: Any = "
     world = {"size": size, **of_world}
     solver = {"broad_phase": settings.pop("broad_phase", "octree"), "time_step": step}
     return Scene(world=world, particles=list(groups), solver=solver, **settings)
+
+
+def off_a_blade(angular_velocity: float, distance: float, reach: float, start: float) -> tuple[float, np.ndarray]:
+    """When a blade that turns about z strikes a ball at rest on the x axis [s], and the velocity that this one gets.
+
+    The ball at distance d is touched on the flat side when the face is the ``reach`` r + h from its centre, the radius
+    and half the blade's thickness: d sin(angle) = r + h. The face moves there at w d cos(angle), and the ball goes off
+    at twice that, along the normal. The blade is at the angle ``start`` at time 0.
+    """
+    touching = -math.asin(reach / distance)
+    speed = 2.0 * angular_velocity * distance * math.cos(touching)
+    return (touching - start) / angular_velocity, speed * np.array([-math.sin(touching), math.cos(touching), 0.0])
 
 
 def gas(count: int = 20, *, seed: int = 1, **settings: Any) -> Scene:
