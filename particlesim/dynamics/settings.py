@@ -24,6 +24,19 @@ PERIODIC_ROOM = 0.25
 MAX_ISLAND_ROUNDS = 40
 MAX_SUBSTEP_BISECTIONS = 5
 
+# Where nothing touches anything for MIN_STRETCH substeps, bodies go there in one stretch, of MAX_STRETCH substeps at
+# most, as a body of three different moments turns in steps. Fewer: little is saved, and a look that ends at the first
+# pair that meets sooner goes on for longer where bodies are crowded. It is asked again after ASK_AGAIN substeps, and
+# only where the square of the number of bodies is no more than MAX_PAIRS_AT_ONCE: so many are looked at in less time
+# than a substep takes.
+MIN_STRETCH = 32
+MAX_STRETCH = 1_000_000
+ASK_AGAIN = 500
+MAX_PAIRS_AT_ONCE = 40_000
+
+# A time step of more substeps than this is refused: they would take hours.
+MAX_SUBSTEPS = 10_000_000
+
 # ---- neighbour lists -----------------------------------------------------------------------------------------------
 
 # A body may get this fraction of its radius away from its reference position before neighbours are searched anew, and

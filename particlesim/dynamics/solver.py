@@ -19,6 +19,7 @@ import numpy as np
 from particlesim.core.parallel import ThreadTeam
 from particlesim.dynamics.advance import advance, sum_speeds, time_within_skins
 from particlesim.dynamics.ccd.swept_bounds import BOUND
+from particlesim.dynamics.ccd.undisturbed import check_work, longest_stretch
 from particlesim.dynamics.contact.booking import IMPACTS, LOST, SHEAR, VIRIAL, WALLS, WORK, columns_needed
 from particlesim.dynamics.contact.resting import Borne, RestingContacts, forget_clearance
 from particlesim.dynamics.events.collision_prediction import Predicted, bound_paths, predict, predict_across
@@ -39,6 +40,7 @@ from particlesim.dynamics.neighbour_list import (
 )
 from particlesim.dynamics.scales import periodic_room, set_tolerances, time_for
 from particlesim.dynamics.settings import (
+    ASK_AGAIN,
     ISLAND_COST,
     MAX_ISLAND_ROUNDS,
     MAX_SUBSTEP_BISECTIONS,
@@ -164,8 +166,19 @@ class Solver:
             return math.inf
         return time_for(self._periodic_room, fastest, float(np.linalg.norm(self._system.domain[0]["gravity"])))
 
+    def longest_step(self, displacement: float, most: float) -> float:
+        """As ``longest_substep``, or for how long nothing touches anything if that is far longer, up to ``most``."""
+        longest = self.longest_substep(displacement)
+        return min(max(longest, self._longest_stretch(longest, most)), most)
+
+    def _longest_stretch(self, substep: float, wanted: float) -> float:
+        return 0.0 if self.kicks.there_are(self.model) else longest_stretch(self._system, substep, wanted)
+
     def step(self, duration: float) -> None:
-        """Move all bodies on by ``duration`` [s], from one change of an obstacle's motion to the next."""
+        """Move all bodies on by ``duration`` [s], from one change of an obstacle's motion to the next.
+
+        Where nothing touches anything for many substeps they go in one stretch. ValueError for too many of them.
+        """
         begin = self.state.time
         if len(self._system.motion):
             self._place_obstacles()
@@ -183,15 +196,24 @@ class Solver:
         state.time_within_skins = min(state.time_within_skins, still)
 
     def _go_on(self, duration: float) -> None:
-        """Move all bodies on by ``duration`` [s], in as many equal substeps as that is long."""
-        if duration <= 0.0:
-            return
-        parts = max(1, math.ceil(duration / self.longest_substep(MAX_SUBSTEP_DISPLACEMENT) - 1e-9))
-        part = duration / parts
-        for _ in range(parts):
-            self._kick(0.5 * part, backwards=False)
-            self._substep(part)
-            self._kick(0.5 * part, backwards=True)
+        """Move all bodies on by ``duration`` [s], in equal substeps or freely; after some it is asked again which."""
+        while duration > 0.0:
+            longest = self.longest_substep(MAX_SUBSTEP_DISPLACEMENT)
+            stretch = self._longest_stretch(longest, duration)
+            check_work(duration, max(longest, stretch))
+            if stretch > 0.0:
+                with self._spent_on("advance"):
+                    self._disturbed = np.zeros(0, dtype=np.int64)
+                    self._advance(stretch)
+                duration -= stretch
+                continue
+            parts = max(1, math.ceil(duration / longest - 1e-9))
+            part = duration / parts
+            for _ in range(min(parts, ASK_AGAIN)):
+                self._kick(0.5 * part, backwards=False)
+                self._substep(part)
+                self._kick(0.5 * part, backwards=True)
+            duration *= max(parts - ASK_AGAIN, 0) / parts
 
     def _kick(self, duration: float, backwards: bool) -> None:
         """Let fields and other forces act on all particles in place (see kicks.py)."""

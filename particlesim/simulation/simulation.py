@@ -25,6 +25,9 @@ from particlesim.simulation.conserved import conserved
 from particlesim.simulation.flow import Flow, FlowState
 from particlesim.trajectory.frames import Frame, Header, Ledger
 
+# A run of more time steps than this is refused: it would take years.
+_MOST_STEPS = 1e12
+
 
 class SimulationError(RuntimeError):
     """The state has become impossible: a number that is not finite."""
@@ -123,14 +126,23 @@ class Simulation:
     # ---- going forward -------------------------------------------------------------------------------------------
 
     def run(self, duration: float | None = None, steps: int | None = None) -> None:
-        """Advance by ``duration`` [s], ending exactly there, or by a number of time steps."""
+        """Advance by ``duration`` [s], ending exactly there, or by a number of time steps.
+
+        ValueError for neither or both, for less than none, or for what there would be no end to.
+        """
         if (duration is None) == (steps is None):
             raise ValueError("give a duration or a number of steps")
         if steps is not None:
             for _ in range(steps):
                 self.step()
             return
-        self.run_until(self.time + float(duration or 0.0))
+        seconds = float(duration or 0.0)
+        if not 0.0 <= seconds < math.inf:
+            raise ValueError(f"duration must be a finite number of seconds of 0 or more, not {duration!r}")
+        needed = seconds / self.next_time_step()
+        if needed > _MOST_STEPS:
+            raise ValueError(f"duration = {seconds:g} s takes about {needed:.0e} time steps")
+        self.run_until(self.time + seconds)
 
     def run_until(self, end: float) -> None:
         """Advance to the time ``end`` [s], in equal steps as long as the automatic time step stays the same."""
@@ -152,10 +164,17 @@ class Simulation:
         """
         if self.scene.solver.time_step != "auto":
             return self.scene.solver.time_step
-        return min(self._solver.longest_substep(STEP_DISPLACEMENT), self._frame_time)
+        if self.scene.is_open:  # what is in a sink after a time step is taken out
+            return min(self._solver.longest_substep(STEP_DISPLACEMENT), self._frame_time)
+        return self._solver.longest_step(STEP_DISPLACEMENT, self._frame_time)
 
     def step(self, time_step: float | None = None) -> None:
-        """One time step [s], the automatic one if not given."""
+        """One time step [s], the automatic one if not given.
+
+        ValueError for one that is not above 0, or so long that it would take millions of substeps.
+        """
+        if time_step is not None and not 0.0 < time_step < math.inf:
+            raise ValueError(f"time_step must be a finite number of seconds above 0, not {time_step!r}")
         with limit_threads(self._threads):
             self.time_step = self.next_time_step() if time_step is None else time_step
             self._solver.step(self.time_step)
