@@ -332,7 +332,7 @@ class TestCommand:
         assert "pairs: the same, to the last bit" in result.stdout
         assert "mixed: particle 416 of 416" in result.stderr
         figure = (folder / "renders/compare_mixed.svg").read_text()
-        assert "n (n - 1), as the paper counts naive" in figure and "boxing (grid)" in figure
+        assert "n (n - 1), as the paper counts naive" in figure and ">grid<" in figure and "boxing" not in figure
 
     def test_quiet_prints_nothing(self, folder):
         result = run("--sweep", "uniform", "--largest", "100", "-q", "-o", "here.json")

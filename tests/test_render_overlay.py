@@ -104,7 +104,7 @@ def test_pairs_tested_are_those_of_the_broad_phases():
     lower, upper = frame_boxes(simulation.header, frame)
     tested = {name: METHODS[name](lower, upper, np.zeros(3))[1] for name in METHODS}
     assert rows["naive tests"] == f"{tested['naive']:,}" == f"{240 * 239 // 2:,}"
-    assert (rows["boxing tests"], rows["octree tests"]) == (f"{tested['grid']:,}", f"{tested['octree']:,}")
+    assert (rows["grid tests"], rows["octree tests"]) == (f"{tested['grid']:,}", f"{tested['octree']:,}")
     own = METHODS["grid"](lower, upper, np.zeros(3), cells=3)[1]
     assert rows["pairs tested"] == f"{100 * own / tested['naive']:.2f} %"
 

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 _COLOURS = {"naive": "#D55E00", "grid": "#0072B2", "octree": "#009E73"}
 _FURTHER = ("#CC79A7", "#E69F00", "#56B4E9", "#F0E442")  # for broad phases that join the registry
 _OTHERS = ("#7F7F7F", "#B0B0B0")
-_NAMES = {"grid": "boxing (grid)"}
 
 
 def draw_sweep(sweep: Sweep, path: Path) -> list[Path]:
@@ -79,7 +78,7 @@ def _curve(
     exponent = sweep.exponent(method, value)
     fitted = "" if exponent is None else f", n^{exponent:.2f}"
     style = {"color": other, "lw": 1.0, "ls": "--"} if other else {"color": _COLOURS[method], "lw": 1.8}
-    axes.plot(counts, measured, marker="o", ms=3.0, label=f"{_NAMES.get(method, method)}{fitted}", **style)
+    axes.plot(counts, measured, marker="o", ms=3.0, label=f"{method}{fitted}", **style)
 
 
 def _figure(width: float, height: float) -> Figure:

@@ -19,9 +19,6 @@ from particlesim.trajectory.frames import Frame, Ledger
 if TYPE_CHECKING:
     from particlesim.rendering.look import Look
 
-# Methods as the readout calls them and as the library does.
-_METHODS = {"naive": "naive", "boxing": "grid", "octree": "octree"}
-
 
 class Row(NamedTuple):
     """A line: name, value, and the longest value that one expects, so that the panel need not grow."""
@@ -86,8 +83,8 @@ def _pairs_tested(look: Look, frame: Frame, history: History) -> Iterator[Row]:
 
 def _broad_phases(look: Look, frame: Frame, history: History) -> Iterator[Row]:
     longest = f"{_pairs(len(frame.position)):,}"
-    for name, method in _METHODS.items():
-        yield Row(f"{name} tests", f"{_tested(look, frame, method):,}", longest)
+    for name in METHODS:
+        yield Row(f"{name} tests", f"{_tested(look, frame, name):,}", longest)
 
 
 def _dissipation(look: Look, frame: Frame, history: History) -> Iterator[Row]:
