@@ -72,13 +72,11 @@ WRONG = [
     (["--scale", "1e-3x"], "--scale 1e-3x: must be a number above 0"),
     (["--scale", "1e9"], "--scale 1e9: would be 5,000,000,000; there may be up to 100,000,000"),
     (["--look", "none.toml"], "none.toml: no such file"),
-    (["--look", "two.toml"], "two.toml: particles: has 2 groups of particles, but 1 are to be drawn"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("arguments", "line"), WRONG, ids=[" ".join(arguments) for arguments, _ in WRONG])
 def test_a_wrong_value_gets_one_line(arguments, line, folder):
-    (folder / "two.toml").write_text(SCENE + '[[particles]]\nshape = "cube"\ncount = 1\n')
     result = run("scene.toml", *arguments)
     assert (result.exit_code, result.stderr, result.stdout) == (2, line + "\n", "")
     assert not (folder / "renders").exists()
@@ -211,6 +209,14 @@ def test_a_trajectory_cannot_be_scaled(folder):
         2,
         "--scale: only of a scene, whose particles are yet to be placed\n",
     )
+
+
+def test_a_look_of_other_groups_keeps_the_colours():
+    one = scene({"shape": "sphere", "count": 3, "colour": "red"})
+    two = scene({"shape": "cube", "count": 9}, {"shape": "cube", "count": 9}, camera="orbit")
+    two.movie.background = "black"
+    both = with_look(one, two)
+    assert (both.camera, both.movie.background, both.particles) == (two.camera, "black", one.particles)
 
 
 def test_a_look_leaves_the_physics_alone():

@@ -42,17 +42,13 @@ def with_colour(scene: Scene, colour: str) -> Scene:
 
 
 def with_look(scene: Scene, other: Scene) -> Scene:
-    """The scene with the camera, the movie, what is shown, and the colours of another one.
-
-    SceneError if the other one has another number of groups.
-    """
-    if len(other.groups) != len(scene.groups):
-        there, here = len(other.groups), len(scene.groups)
-        raise SceneError(f"has {there} groups of particles, but {here} are to be drawn", "particles")
-    groups = [
-        own.model_copy(update={"colour": look.colour, "colour_range": look.colour_range})
-        for own, look in zip(scene.groups, other.groups, strict=True)
-    ]
+    """The scene with camera, movie and what is shown of another one; with its colours too if it has as many groups."""
+    groups = list(scene.groups)
+    if len(other.groups) == len(groups):
+        groups = [
+            own.model_copy(update={"colour": look.colour, "colour_range": look.colour_range})
+            for own, look in zip(groups, other.groups, strict=True)
+        ]
     return scene.model_copy(update={**_grouped(scene, groups), **{key: getattr(other, key) for key in _LOOK}})
 
 
