@@ -238,6 +238,19 @@ BROKEN = [
         "camera.keys: times must grow from key to key, but 1 follows 1",
     ),
     (GOOD + "[show]\nreadout = 1\n", f"show.readout = 1: {ROWS}"),
+    (
+        GOOD + '[show]\nreadout = ["time", "time"]\n',
+        'show.readout = ["time", "time"]: must have each row once, but has \'time\' 2 times',
+    ),
+    (
+        GOOD + '[camera]\nkind = "path"\nkeys = [{ time = -5, position = [1, 2, 3] }]\n',
+        "camera.keys[0].time = -5: must be a number of seconds of 0 or more",
+    ),
+    (
+        "duration = 1e9\n" + GOOD + "[movie]\nfps = 240\n",
+        "duration = 1e+09 s at 240 frames a second of the scene makes 240,000,000,001 frames; "
+        "there may be up to 100,000,000",
+    ),
     (GOOD + '[show]\nreadout = ["tme"]\n', f"show.readout = [\"tme\"]: {ROWS}; did you mean 'time'?"),
     (GOOD + '[show]\nlegend = "on"\n', 'show.legend = "on": must be true or false'),
     (group(colour='"by_speed"', colour_range="[1, 1]"), f"particles[0].colour_range = [1, 1]: {RANGE}"),
@@ -279,7 +292,7 @@ BROKEN = [
     (group(count="90_000_000_000", size="1e-9"), f"particles[0].count = 90000000000: {COUNT}"),
     (
         group(count="1000", placement='{ kind = "cluster", spread = 0.05, centres = [[0, 0, 0]] }'),
-        "particles[0].count = 1000: no room for 990 of them at random: fewer or smaller particles, a wider spread",
+        "particles[0].count = 1000: no room for 990 of them at random, which fills about 0.3 of it: fewer or smaller particles, a wider spread",
     ),
     (
         group(placement='{ kind = "cluster", spread = 1, centres = [[9, 0, 0]] }'),
@@ -322,7 +335,8 @@ BROKEN = [
     ),
     (
         group(count="60", placement=f'{{ kind = "random", region = {{ {ROUND} }} }}'),
-        "particles[0].count = 60: no room for 23 of them at random: fewer or smaller particles, more room, or a lattice",
+        "particles[0].count = 60: no room for 23 of them at random, which fills about 0.3 of it: "
+        "fewer or smaller particles, more room, or a lattice (spheres: up to 0.52)",
     ),
     (
         group(placement=f'{{ kind = "cluster", spread = 1, centres = [[0.4, 0.4, 0.4]], region = {{ {ROUND} }} }}'),

@@ -22,6 +22,9 @@ from particlesim.scene.surface import WALLS, Contact
 from particlesim.scene.validation_errors import explain
 from particlesim.scene.world import Solver, World
 
+# More frames than this are refused: a movie of months.
+_MOST_FRAMES = 100_000_000
+
 
 class Scene(Model):
     """A whole scene. ``Scene(...)`` in Python takes what a scene file says, as dicts or as the models above.
@@ -95,6 +98,16 @@ class Scene(Model):
     def _storable(self) -> Scene:
         if self.number > MAX_COUNT:
             raise ValueError(f"{self.number:,} particles in all; there may be up to {MAX_COUNT:,}")
+        return self
+
+    @model_validator(mode="after")
+    def _ends_some_day(self) -> Scene:
+        if self.frames > _MOST_FRAMES:
+            per_second = f"{self.movie.fps / self.movie.speed:g} frames a second of the scene"
+            raise ValueError(
+                f"duration = {self.duration:g} s at {per_second} makes {self.frames:,} frames; "
+                f"there may be up to {_MOST_FRAMES:,}"
+            )
         return self
 
     @property

@@ -95,7 +95,7 @@ class OrbitCamera(_Aimed):
 class CameraKey(_Placed):
     """Where a camera is at one time."""
 
-    time: Finite  # [s]
+    time: Annotated[NotNegative, must_be("a number of seconds of 0 or more")]  # [s]
 
 
 class PathCamera(Model):
@@ -184,6 +184,8 @@ def _readout(value: Any) -> Any:
     for word in value:
         if word not in _ROWS:
             raise ValueError(what + (hint(word, _ROWS) if isinstance(word, str) else ""))
+        if value.count(word) > 1:
+            raise ValueError(f"must have each row once, but has '{word}' {value.count(word)} times")
     return list(value)
 
 

@@ -103,8 +103,10 @@ def _insert(known: Known, insertion: Insertion, trials: Trials, left: np.ndarray
 
 
 def _no_room(g: int, group: Group, left: int) -> SceneError:
-    wider = "a wider spread" if isinstance(group.placement, ClusterPlacement) else "more room, or a lattice"
-    message = f"no room for {left:,} of them at random: fewer or smaller particles, {wider}"
+    is_cluster = isinstance(group.placement, ClusterPlacement)
+    wider = "a wider spread" if is_cluster else "more room, or a lattice (spheres: up to 0.52)"
+    none = f"no room for {left:,} of them at random, which fills about 0.3 of it"
+    message = f"{none}: fewer or smaller particles, {wider}"
     return SceneError(message, f"particles[{g}].count", group.number)
 
 
