@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+import typer.core
 
 from particlesim.cli.bench import measure_drawing, measure_steps
 from particlesim.cli.clean import clean
@@ -21,8 +23,37 @@ from particlesim.cli.tables import print_report, print_table
 from particlesim.core.interrupts import raise_signals
 from particlesim.core.output_path import check_output
 
+# What Typer raises for a wrong command line.
+_UsageError: Any = typer.BadParameter.__base__
+
+
+class _OneLineUsage(typer.core.TyperGroup):
+    """The program: a wrong command line gets one line, as wrong scenes do, and not the four that Typer prints."""
+
+    def make_context(self, *args: Any, **options: Any) -> Any:
+        """The options of the program itself."""
+        return _in_one_line(super().make_context, *args, **options)
+
+    def invoke(self, ctx: Any) -> Any:
+        """A command with its options."""
+        return _in_one_line(super().invoke, ctx)
+
+
+def _in_one_line(call: Callable[..., Any], *args: Any, **options: Any) -> Any:
+    """What ``call`` returns; a wrong command line ends the program in one line that says where there is help."""
+    try:
+        return call(*args, **options)
+    except _UsageError as error:
+        message = error.format_message()
+        if "\n" in message:  # the help itself, for no arguments at all
+            raise
+        command = error.ctx.command_path if error.ctx else "particlesim"
+        fail(f"{message.rstrip('.')}; see {command} --help", 2)
+
+
 app = typer.Typer(
     name="particlesim",
+    cls=_OneLineUsage,
     help="From a scene file to a movie of particles that bounce as physics says they do, without a screen.",
     no_args_is_help=True,
     add_completion=False,
