@@ -40,11 +40,16 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+def frame(time, energy, **left):
+    """What a summary looks at of a frame."""
+    return SimpleNamespace(time=time, ledger=ledger(time=time, kinetic_translational=energy, **left))
+
+
 def summary(energies, *, elastic):
     """Of frames with these energies, nothing else of which changes."""
     made = Summary(1.0, (0.0, 0.0, 0.0), elastic)
     for k, energy in enumerate(energies):
-        made.add(SimpleNamespace(ledger=ledger(time=float(k), kinetic_translational=energy)))
+        made.add(frame(float(k), energy))
     return made
 
 
@@ -100,9 +105,9 @@ def test_a_limit_that_is_none_is_refused(folder, value):
 
 def test_what_was_left_over_is_told(capsys):
     made = Summary(1.0, np.zeros(3))
-    made.add(SimpleNamespace(ledger=ledger(kinetic_translational=1.0)))
+    made.add(frame(0.0, 1.0))
     print_summary(made, Path("run.gsd"))
     assert "left over" not in capsys.readouterr().out
-    made.add(SimpleNamespace(ledger=ledger(time=1.0, kinetic_translational=1.0, unresolved=7)))
+    made.add(frame(1.0, 1.0, unresolved=7))
     print_summary(made, Path("run.gsd"))
     assert re.search(r"steps with impacts left over\W+7\b", capsys.readouterr().out)

@@ -91,9 +91,16 @@ def print_pictures(pictures: list[Drawn]) -> None:
 
 def print_summary(summary: Summary, path: Path) -> None:
     """What a run amounted to that was written to ``path``."""
+    rows: list[tuple[str, Any]] = [("frames", _frames(summary)), _times(summary)]
+    if summary.has_ledger:
+        rows += _ledger_rows(summary)
+    rows += [(name, f"{seconds:.1f} s") for name, seconds in summary.seconds.items()]
+    print_table(str(path), rows)
+
+
+def _ledger_rows(summary: Summary) -> list[tuple[str, Any]]:
+    """What is known of energy, momentum and impacts."""
     rows: list[tuple[str, Any]] = [
-        ("frames", _frames(summary)),
-        ("simulated", f"{summary.simulated_seconds:g} s"),
         ("impacts", f"{summary.impacts:,}"),
         ("worst energy change", f"{summary.worst_energy_drift:.1e} of all of it"),
         *((f"lost by {cause}", f"{share:.3g} of all of it") for cause, share in summary.dissipated.items() if share),
@@ -110,8 +117,15 @@ def print_summary(summary: Summary, path: Path) -> None:
     rows.append(("largest overlap", f"{summary.largest_overlap:.1e} m"))
     if summary.unresolved:
         rows.append(("steps with impacts left over", summary.unresolved))
-    rows += [(name, f"{seconds:.1f} s") for name, seconds in summary.seconds.items()]
-    print_table(str(path), rows)
+    return rows
+
+
+def _times(summary: Summary) -> tuple[str, str]:
+    """How long was simulated, or which times of a trajectory were read."""
+    if "simulating" in summary.seconds:
+        return "simulated", f"{summary.simulated_seconds:g} s"
+    first, last = summary.times
+    return "time", f"{last:g} s" if first == last else f"{first:g} to {last:g} s"
 
 
 def _frames(summary: Summary) -> str:

@@ -30,6 +30,12 @@ class Summary:
         self.drawn = 0  # how many of the frames there are pictures of
         self.largest_overlap = 0.0
         self.seconds: dict[str, float] = {}  # spent in each part, but for what was done beside another
+        self.times = (0.0, 0.0)  # of the first frame and the last [s]
+
+    def __repr__(self) -> str:
+        known = f", {self.impacts:,} impacts, worst energy change {self.worst_energy_drift:.1e}" if self._last else ""
+        first, last = self.times
+        return f"<Summary: {self.frames:,} frames, {self.drawn:,} drawn, {first:g} to {last:g} s{known}>"
 
     def table(self) -> dict[str, Any]:
         """What has passed as plain values."""
@@ -41,6 +47,7 @@ class Summary:
 
     def add(self, frame: Frame) -> None:
         """Take a frame into account."""
+        self.times = (self.times[0] if self.frames else frame.time, frame.time)
         self.frames += 1
         if frame.ledger is not None:
             self._account(frame.ledger)
@@ -54,6 +61,11 @@ class Summary:
         self._largest_change = max(self._largest_change, abs(ledger.own_energy - self._first.own_energy))
         self._least = min(self._least, ledger.own_energy)
         self._largest_gain = max(self._largest_gain, ledger.own_energy - self._least)
+
+    @property
+    def has_ledger(self) -> bool:
+        """Whether energies and impacts are known; of what other programs wrote they are not."""
+        return self._last is not None
 
     @property
     def simulated_seconds(self) -> float:

@@ -81,6 +81,8 @@ class TrajectoryWriter:
         self._types, self._type_of = _display_types(header)
         if kept:
             cut(path, kept)
+        else:
+            Path(path).touch()  # as other files are made: GSD would keep it from all others
         self._file = gsd.hoomd.open(str(path), "r+" if kept else "w")
         self._count = kept
 
