@@ -11,6 +11,7 @@ import time
 import pytest
 from typer.testing import CliRunner
 
+import particlesim as ps
 from particlesim.cli import main as cli
 from particlesim.cli.doctor import Finding
 from particlesim.cli.progress import shown_progress
@@ -226,7 +227,11 @@ def test_plain_progress_lines_carry_an_estimate(capsys, monkeypatch):
         for done in range(1, 101):
             progress("simulating", done, 100)
     lines = capsys.readouterr().err.splitlines()
-    assert lines[:3] == ["preparing 100 frames", "simulating: frame 1 of 100", "simulating: frame 2 of 100"]
+    assert lines[:3] == [
+        "preparing 100 frames",
+        "simulating: frame 1 of 100",
+        "simulating: frame 2 of 100, 33 min left",
+    ]
     assert lines[3] == "simulating: frame 3 of 100, 32 min left"
     assert lines[-2:] == ["simulating: frame 99 of 100, 20 s left", "simulating: frame 100 of 100"]
 
@@ -260,3 +265,53 @@ def test_a_terminal_gets_a_bar(folder):
     assert result.returncode == 0
     assert "preparing" in text
     assert "frame 4 of 4" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["rendr", "x"], "No such command 'rendr'. Did you mean 'render'?; see particlesim --help"),
+        (["check"], "Missing argument 'SCENE'; see particlesim check --help"),
+        (["check", "x", "--foo"], "No such option: --foo; see particlesim check --help"),
+        (["--foo"], "No such option: --foo; see particlesim --help"),
+        (["simulate", "x", "--threads", "0"], "Invalid value for '--threads': must be 1 or more; see particlesim"),
+    ],
+)
+def test_a_wrong_command_line_gets_one_line(arguments, line):
+    result = program(*arguments)
+    assert (result.returncode, result.stdout, result.stderr.count("\n")) == (2, "", 1)
+    assert result.stderr.replace("python -m ", "").startswith(line)
+
+
+def test_check_tells_title_mass_and_computing_time(folder):
+    scene = 'title = "Five balls"\n' + SCENE.replace("name =", "mass = 2.0\nname =")
+    (folder / "scene.toml").write_text(scene)
+    run("simulate", "scene.toml")
+    output = " ".join(run("check", "scene.toml").stdout.replace("\u2502", " ").split())
+    assert "title Five balls" in output and "mass 10 kg in all" in output
+    assert "computing about 0 s to simulate" in output or "computing a step" in output
+
+
+def test_steps_without_end_are_refused(folder):
+    (folder / "scene.toml").write_text(SCENE + "[solver]\ntime_step = 1e-30\n")
+    for command in ("check", "simulate"):
+        result = run(command, "scene.toml")
+        assert result.exit_code == 2 and result.stderr.splitlines()[-1] == (
+            "scene.toml: solver.time_step = 1e-30: takes about 1e+29 time steps; there may be up to 1e+12"
+        )
+    assert not (folder / "renders").exists()
+
+
+def test_a_trajectory_is_readable_as_a_movie_is_and_says_its_times(folder):
+    os.umask(before := os.umask(0o022))
+    assert run("simulate", "scene.toml", "-q").exit_code == 0
+    path = folder / "renders/scene.gsd"
+    assert path.stat().st_mode & 0o777 == 0o666 & ~before
+    output = " ".join(run("render", str(path), "--still", "0.1", "-o", "x.png").stdout.split())
+    assert "time \u2502 0.1 s" in output and "simulated" not in output
+
+
+def test_what_the_library_shows_of_itself(folder):
+    assert [name for name in dir(ps) if not name.startswith("__")] == sorted(ps.__all__)
+    summary = ps.simulate(ps.load_scene("scene.toml"), "x.gsd")
+    assert repr(summary).startswith("<Summary: 4 frames, 0 drawn, 0 to 0.1 s, ")

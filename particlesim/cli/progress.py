@@ -12,35 +12,36 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.text import Text
 
 from particlesim.core.constants import COMPILING
+from particlesim.core.durations import in_words
 
 # Seconds between lines where there is no terminal.
 _INTERVAL = 5.0
 
-# The first frames compile kernels and say nothing about the rest; the time left is counted from this one on.
-_FIRST_TIMED = 2
+# The first work loads kernels and says nothing about the rest; the time left is told from this many seconds after it.
+_TIMED = 1.0
 
 
 class _Rate:
     """How long the rest of a phase takes, from how long its frames took."""
 
     def __init__(self) -> None:
-        self._start: float | None = None
+        self._start: tuple[float, float] | None = None
 
-    def left(self, done: int, total: int) -> float | None:
+    def left(self, done: float, total: int) -> float | None:
         """Seconds left after ``done`` of ``total`` frames, None if that cannot be said yet."""
         now = time.monotonic()
-        if done <= _FIRST_TIMED or self._start is None:
-            self._start = now
+        if done <= 1 or self._start is None:
+            self._start = now, max(done, 1.0)
             return None
-        return (now - self._start) / (done - _FIRST_TIMED) * (total - done)
+        begun, first = self._start
+        if done <= first or now - begun < _TIMED:
+            return None
+        return (now - begun) / (done - first) * (total - done)
 
 
 def _words(seconds: float) -> str:
     """A time left as people say it."""
-    if seconds < 99.5:
-        return f"{seconds:.0f} s left"
-    minutes = round(seconds / 60.0)
-    return f"{minutes} min left" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min left"
+    return f"{in_words(seconds)} left"
 
 
 def _unit_of(phase: str, usual: str) -> str:
@@ -57,7 +58,7 @@ class _Lines:
         self._last = time.monotonic()
         self._rate = _Rate()
 
-    def __call__(self, phase: str, done: int, total: int) -> None:
+    def __call__(self, phase: str, done: float, total: int) -> None:
         now = time.monotonic()
         left = self._rate.left(done, total)
         if phase == self._phase and now - self._last < _INTERVAL and done < total:

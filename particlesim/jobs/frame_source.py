@@ -13,6 +13,7 @@ import numpy as np
 
 from particlesim.jobs.partial_run import PartialRun
 from particlesim.scene import Scene
+from particlesim.simulation.estimate import check_end
 from particlesim.simulation.simulation import Simulation
 from particlesim.trajectory.frames import Frame, Header
 from particlesim.trajectory.gsd_file import Trajectory
@@ -123,7 +124,9 @@ def frame_source_until(
 def start(scene: Scene, threads: int | None, progress: Progress | None) -> Simulation:
     """The simulation of a scene. SceneError if it cannot be built."""
     tell(progress, "preparing", 0, scene.frames)
-    return Simulation(scene, threads=threads)
+    simulation = Simulation(scene, threads=threads)
+    check_end(simulation)
+    return simulation
 
 
 def frames_of(simulation: Simulation, total: int, first: int = 0) -> Frames:

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import math
+import time
 
 import numpy as np
 
+from particlesim.core.durations import in_words
+from particlesim.core.jit import is_compiled
 from particlesim.scene import Scene
 from particlesim.scene.camera import Movie
+from particlesim.scene.file import SceneError
 from particlesim.setup.build import BYTES_PER_PARTICLE
-from particlesim.simulation.simulation import Simulation
+from particlesim.simulation.simulation import MOST_STEPS, Simulation
+
+# Seconds for which steps are measured, of which one may take longer.
+_MEASURED = 1.0
 
 # Bytes of the process before any particle: interpreter, numpy, numba, compiled kernels, OpenGL.
 _BYTES_OF_PROCESS = 400e6
@@ -18,8 +25,10 @@ _BYTES_OF_PROCESS = 400e6
 def estimate(scene: Scene) -> list[tuple[str, str]]:
     """Name and value of what one wants to know of a scene. SceneError if it cannot be built."""
     simulation = Simulation(scene)
+    check_end(simulation)
     world, movie = scene.world, scene.movie
     return [
+        *([("title", scene.title)] if scene.title else []),
         *_particle_rows(simulation),
         ("world", f"{' x '.join(f'{edge:g}' for edge in world.size)} m, {', '.join(world.boundary)}"),
         ("volume fraction", f"{_volume(simulation) / math.prod(world.size):.3g}"),
@@ -28,7 +37,34 @@ def estimate(scene: Scene) -> list[tuple[str, str]]:
         ("duration", f"{scene.duration:g} s"),
         ("frames", f"{scene.frames:,} of {movie.size[0]} x {movie.size[1]} at {movie.fps:g} a second{_speed(movie)}"),
         ("memory", f"about {_bytes(scene) / 1e6:,.0f} MB"),
+        ("computing", _computing(simulation)),
     ]
+
+
+def check_end(simulation: Simulation) -> None:
+    """SceneError if there is no end to the simulation of a scene."""
+    scene = simulation.scene
+    needed = simulation.steps_of(scene.duration)
+    if needed > MOST_STEPS:
+        key = "duration" if scene.solver.time_step == "auto" else "solver.time_step"
+        value = scene.duration if scene.solver.time_step == "auto" else scene.solver.time_step
+        raise SceneError(f"takes about {needed:.0e} time steps; there may be up to {MOST_STEPS:.0e}", key, value)
+
+
+def _computing(simulation: Simulation) -> str:
+    """How long the simulation takes, from a few of its steps, which are taken."""
+    if not is_compiled("dynamics.events.event_queue"):
+        return "not known before the kernels are compiled, which the first run does"
+    duration = simulation.scene.duration
+    simulation.step(min(simulation.next_time_step(), duration))  # the first step also loads kernels
+    begun, start = simulation.time, time.perf_counter()
+    while time.perf_counter() - start < _MEASURED and simulation.time < duration:
+        simulation.step()
+    passed = simulation.time - begun
+    if not passed:
+        return "a step"
+    seconds = (time.perf_counter() - start) / passed * duration
+    return f"about {in_words(seconds)} to simulate, as the first {passed:.3g} s of the scene go; pictures come on top"
 
 
 def _particle_rows(simulation: Simulation) -> list[tuple[str, str]]:
@@ -48,7 +84,8 @@ def _group(simulation: Simulation, members: np.ndarray) -> str:
     """What the particles of a group (m,) BODY amount to."""
     shape, sizes = simulation.model.shapes[int(members["shape_row"][0])], members["scale"]
     span = f"{sizes.min():g}" if sizes.min() == sizes.max() else f"{sizes.min():g} to {sizes.max():g}"
-    return f"{len(members):,} x {shape.name}, size {span}, mass {members['mass'].sum():.4g} kg"
+    mass = f"{members['mass'].sum():.4g} kg{' in all' if len(members) > 1 else ''}"
+    return f"{len(members):,} x {shape.name}, size {span}, mass {mass}"
 
 
 def _volume(simulation: Simulation) -> float:

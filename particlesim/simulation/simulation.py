@@ -26,7 +26,7 @@ from particlesim.simulation.flow import Flow, FlowState
 from particlesim.trajectory.frames import Frame, Header, Ledger
 
 # A run of more time steps than this is refused: it would take years.
-_MOST_STEPS = 1e12
+MOST_STEPS = 1e12
 
 
 class SimulationError(RuntimeError):
@@ -139,10 +139,13 @@ class Simulation:
         seconds = float(duration or 0.0)
         if not 0.0 <= seconds < math.inf:
             raise ValueError(f"duration must be a finite number of seconds of 0 or more, not {duration!r}")
-        needed = seconds / self.next_time_step()
-        if needed > _MOST_STEPS:
-            raise ValueError(f"duration = {seconds:g} s takes about {needed:.0e} time steps")
+        if self.steps_of(seconds) > MOST_STEPS:
+            raise ValueError(f"duration = {seconds:g} s takes about {self.steps_of(seconds):.0e} time steps")
         self.run_until(self.time + seconds)
+
+    def steps_of(self, duration: float) -> float:
+        """About how many time steps a ``duration`` [s] takes, as long as they stay as they are."""
+        return math.ceil(duration / self.next_time_step() - 1e-9)
 
     def run_until(self, end: float) -> None:
         """Advance to the time ``end`` [s], in equal steps as long as the automatic time step stays the same."""
