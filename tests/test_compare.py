@@ -319,7 +319,7 @@ class TestCommand:
             Result("octree", search_seconds=2.2e-4, tested=1000, memory=10),
         ]
         drawn = []
-        monkeypatch.setattr(figure, "_save", lambda shown, _: drawn.append(shown))
+        monkeypatch.setattr(figure, "save_figure", lambda shown, _: drawn.append(shown))
         figure.draw_scene(comparison, folder / "bars")
         for axes, ratio in zip(drawn[0].axes, (2.0, 0.5, 1.0), strict=True):
             first, second = (bar.get_window_extent().height for bar in axes.patches)

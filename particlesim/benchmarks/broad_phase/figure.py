@@ -5,30 +5,25 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from particlesim.benchmarks.broad_phase.measure import machine_words
 from particlesim.benchmarks.broad_phase.runs import SceneComparison
 from particlesim.benchmarks.broad_phase.sweep import Sweep
-from particlesim.core.atomic_write import atomic_write
+from particlesim.core.figure import AMBER, BLUE, GREEN, GREYS, ORANGE, PURPLE, SKY, YELLOW, new_figure, save_figure
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-# Colours that people who confuse red and green can tell apart: M. Okabe, K. Ito, "Color Universal Design", 2008.
-_COLOURS = {"naive": "#D55E00", "grid": "#0072B2", "octree": "#009E73"}
-_FURTHER = ("#CC79A7", "#E69F00", "#56B4E9", "#F0E442")  # for broad phases that join the registry
-_OTHERS = ("#7F7F7F", "#B0B0B0")
+_COLOURS = {"naive": ORANGE, "grid": BLUE, "octree": GREEN}
+_FURTHER = (PURPLE, AMBER, SKY, YELLOW)  # for broad phases that join the registry
 
 
 def draw_sweep(sweep: Sweep, path: Path) -> list[Path]:
-    """Seconds and tests over the number of boxes, both axes logarithmic; ``path`` without its ending."""
-    figure = _figure(10.0, 4.4)
+    """Seconds and tests over the number of boxes, both axes logarithmic, as SVG and PNG."""
+    figure = new_figure(10.0, 4.4)
     left, right = figure.subplots(1, 2)
     for axes, value, label in ((left, "seconds", "seconds for one search"), (right, "tested", "pairs of boxes tested")):
-        others = iter(_OTHERS)
+        others = iter(GREYS[:2])
         for method in sweep.methods:
             counts, measured = sweep.of(method, value)
             if len(counts):
@@ -36,18 +31,18 @@ def draw_sweep(sweep: Sweep, path: Path) -> list[Path]:
                     axes, counts, measured, sweep, method, value, next(others, "k") if method not in _COLOURS else ""
                 )
         axes.set(xscale="log", yscale="log", xlabel="boxes n", ylabel=label)
-        axes.grid(True, which="major", color="#E6E6E6")
+        axes.grid(True, which="major", color=GREYS[2])
     counts = np.array(sorted({row["boxes"] for row in sweep.rows}), dtype=float)
     right.plot(counts, counts * (counts - 1.0), color="k", lw=0.8, ls=":", label="n (n - 1), as the paper counts naive")
     for axes in (left, right):
         axes.legend(frameon=False, fontsize=8)
     figure.suptitle(f"{sweep.kind} boxes, {machine_words(sweep.machine)}", fontsize=11)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def draw_scene(comparison: SceneComparison, path: Path) -> list[Path]:
-    """Bars: seconds of a search, tests, memory of each broad phase that ran; ``path`` without its ending."""
-    figure = _figure(9.0, 3.0)
+    """Bars: seconds of a search, tests, memory of each broad phase that ran, as SVG and PNG."""
+    figure = new_figure(9.0, 3.0)
     panels = (
         ("search_seconds", "seconds for one search"),
         ("tested", "tested, all frames"),
@@ -63,7 +58,7 @@ def draw_scene(comparison: SceneComparison, path: Path) -> list[Path]:
         axes.title.set_size(9)
     about = f"{comparison.name}: {comparison.boxes:,} boxes, {comparison.frames} frames"
     figure.suptitle(f"{about}, {machine_words(comparison.machine)}", fontsize=10)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def _bar_colours(names: Sequence[str]) -> list[str]:
@@ -79,25 +74,3 @@ def _curve(
     fitted = "" if exponent is None else f", n^{exponent:.2f}"
     style = {"color": other, "lw": 1.0, "ls": "--"} if other else {"color": _COLOURS[method], "lw": 1.8}
     axes.plot(counts, measured, marker="o", ms=3.0, label=f"{method}{fitted}", **style)
-
-
-def _figure(width: float, height: float) -> Figure:
-    """An empty figure of this size [inch], apart from any window."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  (slow to import)
-
-    return Figure(figsize=(width, height), layout="constrained")
-
-
-def _save(figure: Figure, path: Path) -> list[Path]:
-    """Write SVG, with text as text and nothing of this moment in it, and PNG; each appears whole or not at all."""
-    from matplotlib import rc_context  # noqa: PLC0415
-
-    written = []
-    for suffix, metadata in ((".svg", {"Date": None}), (".png", {})):
-        with (
-            rc_context({"svg.fonttype": "none", "svg.hashsalt": "particlesim"}),
-            atomic_write(path.with_suffix(suffix)) as hidden,
-        ):
-            figure.savefig(hidden, dpi=110, metadata=metadata)
-        written.append(path.with_suffix(suffix))
-    return written

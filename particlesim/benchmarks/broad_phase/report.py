@@ -17,12 +17,12 @@ from particlesim.core.atomic_write import atomic_write
 
 def write_scene(comparison: SceneComparison, path: Path) -> list[Path]:
     """Write the comparison on a scene to ``path`` (JSON), and its figure; all files written."""
-    return [_write_json(comparison.table(), path), *draw_scene(comparison, path.with_suffix(""))]
+    return [_write_json(comparison.table(), path), *draw_scene(comparison, path)]
 
 
 def write_sweep(sweep: Sweep, path: Path) -> list[Path]:
     """Write a sweep to ``path`` (JSON), and its figure; all files written."""
-    return [_write_json(sweep.table(), path), *draw_sweep(sweep, path.with_suffix(""))]
+    return [_write_json(sweep.table(), path), *draw_sweep(sweep, path)]
 
 
 def write_frames(frames: Frames, world_size: tuple[float, float, float], name: str, path: Path) -> None:
