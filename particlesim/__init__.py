@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from particlesim.simulation.checkpoint import CheckpointError
     from particlesim.simulation.simulation import Simulation, SimulationError
     from particlesim.trajectory.frames import Ledger
-    from particlesim.trajectory.gsd_file import Trajectory, TrajectoryError
+    from particlesim.trajectory.gsd_file import Trajectory, TrajectoryError, open
 
 _HOMES = {
     "CATALOGUE": "geometry.shapes",
@@ -46,6 +46,7 @@ _HOMES = {
     "TrajectoryError": "trajectory.gsd_file",
     "find_pairs": "broad_phase",
     "load_scene": "scene.file",
+    "open": "trajectory.gsd_file",
     "render": "jobs.movie",
     "separation": "geometry.separation",
     "simulate": "jobs.movie",
@@ -68,6 +69,7 @@ __all__ = [
     "TrajectoryError",
     "find_pairs",
     "load_scene",
+    "open",
     "render",
     "separation",
     "simulate",

@@ -61,7 +61,7 @@ def test_a_folder_that_takes_no_files_is_named_before_the_work(no_work):
 def test_a_good_path_is_let_through_and_nothing_is_left(tmp_path):
     (tmp_path / "old.mp4").write_text("of yesterday")
     for name in ("12:30.mp4", "A.MP4", "old.mp4"):
-        check_output(tmp_path / name, ".mp4", ".png")
+        check_output(tmp_path / name, ".mp4", beside=(".png",))
     assert [path.name for path in tmp_path.iterdir()] == ["old.mp4"]
 
 

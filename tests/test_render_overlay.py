@@ -13,10 +13,11 @@ from particlesim.rendering.hud.history import WINDOW, History
 from particlesim.rendering.hud.legend import swatches
 from particlesim.rendering.hud.overlay import Overlay, legend_places
 from particlesim.rendering.hud.panel import Panel, Style
-from particlesim.rendering.hud.readout import energy_change, pressure, readout_rows
+from particlesim.rendering.hud.readout import readout_rows
 from particlesim.rendering.look import look_of
 from particlesim.rendering.shading.colour import PALETTE, encoded, map_colours, palette_colour
 from particlesim.scene import Scene
+from particlesim.trajectory.analysis.observables import energy_change, pressure
 from particlesim.trajectory.frame_aabb import frame_boxes
 from particlesim.trajectory.frames import Frame, Header
 from tests.gases import spheres

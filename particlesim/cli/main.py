@@ -17,6 +17,7 @@ from particlesim.cli.errors import fail, one_line_errors
 from particlesim.cli.info import info
 from particlesim.cli.options import MaxDrift, Quiet, Resume, SceneArgument, Threads
 from particlesim.cli.output import place_for
+from particlesim.cli.plot import plot
 from particlesim.cli.render import render
 from particlesim.cli.run import load, make_file
 from particlesim.cli.tables import print_report, print_table
@@ -157,7 +158,7 @@ def compare(
         is_stream = source is not None and source.suffix.lower() == ".aabb"
         scene = load(source) if source is not None and not is_stream else None
         name = f"{source.stem}_stream" if source and is_stream else source.stem if source else sweep
-        with place_for(output, Path(f"compare_{name}"), ".json", ".svg", ".png") as path:
+        with place_for(output, Path(f"compare_{name}"), ".json", beside=(".svg", ".png")) as path:
             with shown_progress(quiet, "particle" if sweep else "step") as progress:
                 settings: dict[str, Any] = {"limit": limit, "threads": threads, "progress": progress}
                 if scene is not None and source is not None:
@@ -210,6 +211,7 @@ def doctor() -> None:
         fail("\n".join(missing), 1)
 
 
+app.command(short_help="Draw figures of a run, and write its numbers.")(plot)
 app.command(short_help="Say where a movie, a picture or a trajectory comes from.")(info)
 app.command(short_help="Show partial runs, and remove them.")(clean)
 

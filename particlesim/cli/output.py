@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -10,8 +10,8 @@ from particlesim.core.output_path import check_output, check_place
 
 
 @contextmanager
-def place_for(path: Path | None, source: Path, *suffixes: str) -> Iterator[Path]:
-    """Where the result goes: as told, or to renders/ under the name of the source.
+def place_for(path: Path | None, source: Path, *suffixes: str, beside: Sequence[str] = ()) -> Iterator[Path]:
+    """Where the result goes: as told, or to renders/ under the name of the source, with the first of ``suffixes``.
 
     A wrong place is found out before the work, not after it (see ``check_output``); renders/ does not stay behind if
     nothing comes of it.
@@ -19,7 +19,7 @@ def place_for(path: Path | None, source: Path, *suffixes: str) -> Iterator[Path]
     if path is not None:
         check_place(path)
         path = path if path.suffix else path.with_suffix(suffixes[0])
-        check_output(path, *suffixes)
+        check_output(path, *suffixes, beside=beside)
         yield path
         return
     folder = Path("renders")
@@ -27,7 +27,7 @@ def place_for(path: Path | None, source: Path, *suffixes: str) -> Iterator[Path]
     is_new = not folder.exists()
     folder.mkdir(exist_ok=True)
     try:
-        check_output(path, *suffixes)
+        check_output(path, *suffixes, beside=beside)
         yield path
     except BaseException:
         if is_new and not any(folder.iterdir()):

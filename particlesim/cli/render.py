@@ -64,10 +64,10 @@ def render(
 ) -> None:
     """Simulate a scene, or read a trajectory, and make a movie of it, with a poster (PNG) beside it."""
     options = RenderOptions(frames, every, still, look, quality, size, camera, colour, scale)
-    suffixes = (".mp4", ".png") if still is None else (".png",)
+    suffix, beside = (".mp4", (".png",)) if still is None else (".png", ())
     with (
         one_line_errors(source),
-        place_for(output, source, *suffixes) as path,
+        place_for(output, source, suffix, beside=beside) as path,
         _opened(source, options, quiet) as (subject, scene, total),
     ):
         time = still_time(scene.duration, options)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 
@@ -10,15 +11,17 @@ class OutputError(ValueError):
     """A path that no output can be written to as it is; the message is one line."""
 
 
-def check_output(path: str | Path, *suffixes: str) -> None:
-    """Refuse a path at which no file can appear: the first of ``suffixes`` is its own, the others of files beside it.
+def check_output(path: str | Path, *suffixes: str, beside: Sequence[str] = ()) -> None:
+    """Refuse a path at which no file can appear.
 
     Parameters
     ----------
     path
         The file to write.
     *suffixes
-        Its ending, such as ".mp4", and those of files of the same name that come with it.
+        Its ending, such as ".mp4"; one of them if there are several.
+    beside
+        The endings of files of the same name that come with it.
 
     Raises
     ------
@@ -29,9 +32,9 @@ def check_output(path: str | Path, *suffixes: str) -> None:
     """
     path = Path(path)
     check_place(path)
-    if path.suffix.lower() != suffixes[0]:
-        raise OutputError(f"{path}: the output must end in {suffixes[0]}")
-    for suffix in suffixes[1:]:
+    if path.suffix.lower() not in suffixes:
+        raise OutputError(f"{path}: the output must end in {_either(suffixes)}")
+    for suffix in beside:
         check_place(path.with_suffix(suffix))
     if not path.parent.is_dir():
         raise OutputError(f"{path}: there is no folder {path.parent}")
@@ -48,3 +51,8 @@ def check_place(path: Path) -> None:
         raise OutputError(f"{path}: is a folder, not a file to write to")
     if str(path) == "-" or path.parent in (Path("/dev"), Path("/dev/fd")) or (path.exists() and not path.is_file()):
         raise OutputError(f"{path}: is not a file to write to; movies and trajectories need one")
+
+
+def _either(suffixes: Sequence[str]) -> str:
+    """Endings in words: ".svg", ".svg or .png", ".mp4, .webm or .gif"."""
+    return " or ".join(part for part in (", ".join(suffixes[:-1]), suffixes[-1]) if part)

@@ -121,7 +121,7 @@ def render(
     OutputError, PartialRunError, SceneError, SimulationError, OSError
         As for ``simulate``.
     """
-    check_output(path, ".mp4", ".png")
+    check_output(path, ".mp4", beside=(".png",))
     path = Path(path)
     with opened(source) as movable, PartialRun(path, task_of(movable, look, frames), resume) as run:
         platform.choose()

@@ -11,39 +11,33 @@ import functools
 import importlib.metadata
 import json
 from collections.abc import Iterator
-from dataclasses import MISSING, Field, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gsd.hoomd
 import numpy as np
 
-from particlesim.core.constants import CAPSULE, DISSIPATION, SPHERE, WALL_NAMES
 from particlesim.core.rotations import conjugates, quaternion_products
 from particlesim.geometry.convex_hull import hull_polygons
 from particlesim.geometry.shapes import Shape, capsule, drawn_hull, principal_hull, sphere
 from particlesim.scene import Scene
 from particlesim.scene.file import stored_scene
 from particlesim.trajectory.foreign_gsd import FRAME_RATE, Foreign, check_same_particles, read_foreign
-from particlesim.trajectory.frames import Frame, Header, Ledger
+from particlesim.trajectory.frames import Frame, Header
 from particlesim.trajectory.gsd_chunks import Chunks, TrajectoryError, cut, reading
+from particlesim.trajectory.gsd_ledger import ledger_log, ledger_names, read_ledger
+from particlesim.trajectory.gsd_types import display_diameters, display_types
 
-# Other programs draw a shape for each type and do not scale it. Groups of more sizes than this get that many types,
-# evenly spread; the exact sizes are in the file as well. All types of a group have no more corners than this, so that
-# hulls of thousands do not fill the file.
-_MAX_SIZES, _MAX_CORNERS = 64, 20_000
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from particlesim.trajectory.analysis.measurements import Measurements
 
 # What the schema does not have is among its logged quantities; text is stored as bytes. Under the second prefix OVITO
 # finds quantities of the particles.
 _LOG = "log/particlesim/"
-_LEDGER = _LOG + "ledger/"
 _IMPACTS = "log/particles/impacts"
 _ID = "log/particles/id"
-
-# Sides of the prism that stands for a capsule in other programs, and its radius as a fraction of the capsule's: the
-# outline is off by 0.2 %.
-_PRISM_SIDES = 16
-_PRISM_RADIUS = 1e-3
 
 # Quantities of a particle, with what stands for those that are not in the file (the schema's defaults).
 _DEFAULTS: dict[str, tuple[float, ...]] = {
@@ -57,17 +51,6 @@ _DEFAULTS: dict[str, tuple[float, ...]] = {
 # How far the square of a quaternion's length may be from 1: rounding to single precision leaves 1e-6.
 _UNIT = 1e-3
 
-# What the arrays of a ledger are.
-_SHAPES: dict[str, tuple[int, ...]] = {
-    "momentum": (3,),
-    "angular_momentum": (3,),
-    "wall_impulse": (len(WALL_NAMES),),
-    "dissipated": (len(DISSIPATION),),
-    "wall_shear": (len(WALL_NAMES), 3),
-    "flow_mass": (2,),
-    "flow_energy": (2,),
-}
-
 
 _OLDER = "written by an older particlesim; simulate its scene again"
 
@@ -78,7 +61,7 @@ class TrajectoryWriter:
     def __init__(self, path: Path, header: Header, kept: int = 0) -> None:
         self._header = header
         self._box = [*json.loads(header.scene_json)["world"]["size"], 0.0, 0.0, 0.0]
-        self._types, self._type_of = _display_types(header)
+        self._types, self._type_of = display_types(header)
         if kept:
             cut(path, kept)
         else:
@@ -117,11 +100,11 @@ class TrajectoryWriter:
             particles.typeid = self._type_of[ids].astype(np.uint32)
             particles.mass = header.mass[ids].astype(np.float32)
             particles.moment_inertia = header.inertia[ids].astype(np.float32)
-            particles.diameter = _display_diameters(header)[ids]
+            particles.diameter = display_diameters(header)[ids]
         own = {_IMPACTS: frame.impacts.astype(np.uint32), _LOG + "time": np.array([frame.time])}
         if frame.present is not None:
             own[_ID] = ids.astype(np.uint32)
-        out.log.update(_logged({**own, **_ledger_log(frame.ledger)}))
+        out.log.update(_logged({**own, **ledger_log(frame.ledger)}))
         self._file.append(out)
         self._count += 1
 
@@ -140,7 +123,7 @@ class Trajectory:
                 if not chunks.frames:
                     raise TrajectoryError(f"{path}: has no frames")
                 self._is_own = chunks.has(_LOG + "scene")
-                if self._is_own and not all(chunks.has(name) for name in (_IMPACTS, *_ledger_names())):
+                if self._is_own and not all(chunks.has(name) for name in (_IMPACTS, *ledger_names())):
                     raise TrajectoryError(f"{path}: {_OLDER}")
                 found = Foreign(_read_header(chunks), ()) if self._is_own else read_foreign(chunks)
                 self.header, self.assumed = _checked(found.header), found.assumed
@@ -169,6 +152,58 @@ class Trajectory:
         if len(self.header.group) != scene.number or (self.header.group >= len(scene.groups)).any():
             raise TrajectoryError(f"{self.path}: damaged: its particles are not those of its scene")
         return scene
+
+    def table(self, which: str = "time") -> np.ndarray:
+        """The numbers of the run, as a structured array: of energies, momenta and so on, a row for each frame.
+
+        Parameters
+        ----------
+        which : str
+            ``"time"``, ``"radial"`` (the radial distribution) or ``"speeds"`` (beside Maxwell's distribution).
+
+        Returns
+        -------
+        Structured array of float64 in SI units, of which ``pandas.DataFrame`` makes a frame; what is not known is not
+        a number.
+
+        Raises
+        ------
+        ValueError
+            For a table that there is not.
+        TrajectoryError, SceneError
+            If the file is damaged, or its scene cannot be read.
+        """
+        return self._measurements.table(which)
+
+    def plot(self, what: str | None = None) -> Figure:
+        """A figure of the run (matplotlib's): all panels on a page, or one.
+
+        Parameters
+        ----------
+        what : str, optional
+            ``"energy"``, ``"drift"``, ``"momentum"``, ``"impacts"``, ``"temperature"``, ``"pressure"``,
+            ``"displacement"``, ``"radial"`` or ``"speeds"``.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ValueError
+            For a panel that there is not, or of which nothing is known.
+        TrajectoryError, SceneError
+            If the file is damaged, or its scene cannot be read.
+        """
+        from particlesim.trajectory.analysis.panels import draw_panels  # noqa: PLC0415  (brings the broad phases)
+
+        return draw_panels(self._measurements, what)
+
+    @functools.cached_property
+    def _measurements(self) -> Measurements:
+        from particlesim.trajectory.analysis.measurements import measured  # noqa: PLC0415
+
+        return measured(self.scene, self.header, self, len(self))
 
     @property
     def version(self) -> str | None:
@@ -208,58 +243,32 @@ class Trajectory:
                 angular_momentum=_world_momentum(each["angmom"], each["orientation"]),
                 image=each["image"].astype(np.int64),
                 impacts=self._chunks.rows(_IMPACTS, count, (0.0,), k)[:, 0].astype(np.int64),
-                ledger=_read_ledger(self._chunks, k) if self._is_own else None,
+                ledger=read_ledger(self._chunks, k) if self._is_own else None,
                 present=present,
             )
 
 
-def _display_types(header: Header) -> tuple[list[tuple[str, dict[str, Any]]], np.ndarray]:
-    """Types (name, shape as GSD describes it) for other programs, and the type of every particle (n,)."""
-    types: list[tuple[str, dict[str, Any]]] = []
-    type_of = np.zeros(len(header.shape), dtype=np.int64)
-    for group in np.unique(header.group):
-        members = np.flatnonzero(header.group == group)
-        shape = header.shapes[int(header.shape[members[0]])]
-        most = max(1, min(_MAX_SIZES, _MAX_CORNERS // len(shape.vertices)))
-        for rank in _size_classes(header.size[members], most):
-            size = float(np.mean(header.size[members[rank]]))
-            type_of[members[rank]] = len(types)
-            types.append((f"{shape.name}_{group}_{len(types)}", _gsd_shape(shape, size)))
-    return types, type_of
+def open(path: str | Path) -> Trajectory:
+    """Open a trajectory: what ``particlesim simulate`` wrote, or a GSD file of HOOMD-blue and others.
 
+    Parameters
+    ----------
+    path : str or Path
+        The file (.gsd).
 
-def _display_diameters(header: Header) -> np.ndarray:
-    """Diameters of spheres, (n,) float32 [m], and 2 for others, whose shape OVITO stretches by half of it."""
-    spheres = np.array([shape.kind == SPHERE for shape in header.shapes])[header.shape]
-    return np.where(spheres, header.size, 2.0).astype(np.float32)
+    Returns
+    -------
+    Trajectory
+        A sequence of frames, with ``table`` and ``plot``. It is closed at the end of a ``with`` block, or with itself.
 
-
-def _size_classes(size: np.ndarray, most: int) -> list[np.ndarray]:
-    """Which particles share a displayed size, of which there are ``most`` at the most: index arrays."""
-    values, which = np.unique(size, return_inverse=True)
-    if len(values) > most:
-        return np.array_split(np.argsort(size, kind="stable"), most)
-    return [np.flatnonzero(which == k) for k in range(len(values))]
-
-
-def _gsd_shape(shape: Shape, size: float) -> dict[str, Any]:
-    if shape.kind == SPHERE:
-        return {"type": "Sphere", "diameter": size}
-    core, rounding = shape.vertices, shape.rounding
-    if shape.kind == CAPSULE:
-        core, rounding = _thin_prism(shape)
-    return {"type": "ConvexPolyhedron", "rounding_radius": rounding * size, "vertices": (core * size).tolist()}
-
-
-def _thin_prism(shape: Shape) -> tuple[np.ndarray, float]:
-    """Vertices and rounding of a thin prism that looks like a capsule: the core of a polyhedron must enclose volume.
-
-    OVITO draws one flat face for every edge of a rounded polyhedron, so the prism has many.
+    Raises
+    ------
+    TrajectoryError
+        If the file is no trajectory, or damaged.
+    OSError
+        If it cannot be read.
     """
-    thin = _PRISM_RADIUS * shape.rounding
-    angle = 2.0 * np.pi / _PRISM_SIDES * np.arange(_PRISM_SIDES)
-    ring = thin * np.stack([np.cos(angle), np.sin(angle), np.zeros(_PRISM_SIDES)], axis=1)
-    return np.concatenate([end + ring for end in shape.vertices]), shape.rounding - thin
+    return Trajectory(path)
 
 
 def _header_log(header: Header, changing: bool) -> dict[str, np.ndarray]:
@@ -357,33 +366,6 @@ def _checked(header: Header) -> Header:
 def _logged(chunks: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Chunks by the names that the writer of the schema gives logged quantities: without their prefix."""
     return {name.removeprefix("log/"): values for name, values in chunks.items()}
-
-
-def _ledger_log(ledger: Ledger | None) -> dict[str, np.ndarray]:
-    """What is known of a ledger, each field under its name."""
-    if ledger is None:
-        return {}
-    values = {field.name: getattr(ledger, field.name) for field in fields(Ledger)}
-    return {_LEDGER + name: np.atleast_1d(value) for name, value in values.items() if value is not None}
-
-
-def _ledger_names() -> list[str]:
-    """The chunks that every ledger has."""
-    return [_LEDGER + field.name for field in fields(Ledger) if field.default is MISSING]
-
-
-def _read_ledger(chunks: Chunks, k: int) -> Ledger:
-    """The ledger of a frame, by the names of its fields; those that may be unknown may be missing."""
-    known = [field for field in fields(Ledger) if field.default is MISSING or chunks.has(_LEDGER + field.name)]
-    return Ledger(**{field.name: _typed(chunks.read(_LEDGER + field.name, k), field) for field in known})
-
-
-def _typed(value: np.ndarray, field: Field[Any]) -> Any:
-    """The value of a field as its type says. ValueError if it is not as many numbers."""
-    if field.name in _SHAPES:
-        return value.astype(np.float64).reshape(_SHAPES[field.name])
-    (number,) = value.reshape(-1)
-    return int(number) if str(field.type).startswith("int") else float(number)
 
 
 def _quaternion_momentum(frame: Frame) -> np.ndarray:

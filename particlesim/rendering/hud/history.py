@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from particlesim.trajectory.analysis.observables import WINDOW
 from particlesim.trajectory.frames import Ledger
-
-# Averages over time reach over so many frames before the one that is drawn: walls and partners are hit one by one.
-WINDOW = 30
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,9 +12,9 @@ from particlesim.broad_phase import METHODS
 from particlesim.core.constants import DISSIPATION
 from particlesim.rendering.hud.history import History
 from particlesim.rendering.hud.panel import Panel, Style
-from particlesim.scene import Scene
+from particlesim.trajectory.analysis.observables import all_energy, energy_change, has_pressure, pressure, temperature
 from particlesim.trajectory.frame_aabb import frame_boxes
-from particlesim.trajectory.frames import Frame, Ledger
+from particlesim.trajectory.frames import Frame
 
 if TYPE_CHECKING:
     from particlesim.rendering.look import Look
@@ -54,14 +54,12 @@ def _energy_change(look: Look, frame: Frame, history: History) -> Iterator[Row]:
 
 
 def _temperature(look: Look, frame: Frame, history: History) -> Iterator[Row]:
-    """Two thirds of the mean energy of translation: the temperature, with a Boltzmann constant of 1."""
     if frame.ledger and len(frame.position):
-        value = 2.0 / 3.0 * frame.ledger.kinetic_translational / len(frame.position)
-        yield Row("temperature", f"{_figure(value)} J", "0.000e+00 J")
+        yield Row("temperature", f"{_figure(temperature(frame))} J", "0.000e+00 J")
 
 
 def _pressure(look: Look, frame: Frame, history: History) -> Iterator[Row]:
-    if frame.ledger is None or not _has_pressure(look.scene):
+    if frame.ledger is None or not has_pressure(look.scene):
         return
     window = history.up_to(frame.ledger)
     found = pressure(look.scene, window) if len(window) > 1 else None
@@ -91,7 +89,7 @@ def _dissipation(look: Look, frame: Frame, history: History) -> Iterator[Row]:
     """What each cause that there can be in the scene took of the energy."""
     if frame.ledger is None or frame.ledger.dissipated is None or look.start is None:
         return
-    scale = _all_energy(look.start)
+    scale = all_energy(look.start)
     for cause, energy in zip(DISSIPATION, frame.ledger.dissipated.tolist(), strict=True):
         if cause in look.causes:
             yield Row(f"lost by {cause}", f"{100.0 * energy / scale if scale else 0.0:.1f} %", "100.0 %")
@@ -137,44 +135,6 @@ def readout_panel(rows: list[Row], style: Style) -> Panel:
         panel.write(row.name, pad, top, faint=True)
         panel.write(row.value, pad + names + values - style.width(row.value), top)
     return panel
-
-
-def energy_change(now: Ledger, start: Ledger) -> float:
-    """Change of the total energy since ``start``, relative to the kinetic energy and depth of potential there."""
-    scale = _all_energy(start) or _all_energy(now)
-    return (now.energy - start.energy) / scale if scale else 0.0
-
-
-def _all_energy(ledger: Ledger) -> float:
-    """Kinetic energy and depth of the potential [J]."""
-    return ledger.kinetic + abs(ledger.potential)
-
-
-def _has_pressure(scene: Scene) -> bool:
-    """Whether there are walls, or a period all round."""
-    boundary = np.array(scene.world.boundary)
-    return bool((boundary == "wall").any() or (boundary == "periodic").all())
-
-
-def pressure(scene: Scene, window: Sequence[Ledger]) -> float | None:
-    """Mean pressure [Pa] over two frames or more; None if the world has no walls and is not periodic all round.
-
-    On walls: the momentum given to them over area and time. Without walls: from the virial theorem,
-    P V = (2 K + W) / 3 with the mean energy of translation K and the sum W of r . impulse over pairs and time
-    (J.-P. Hansen, I. R. McDonald, Theory of Simple Liquids, 4th ed., eq. 2.2.10).
-    """
-    before, after = window[0], window[-1]
-    duration = after.time - before.time
-    size, boundary = np.array(scene.world.size), np.array(scene.world.boundary)
-    if (walls := boundary == "wall").any():
-        area = 2.0 * float((size.prod() / size)[walls].sum())
-        given = (after.wall_impulse - before.wall_impulse).reshape(3, 2)[walls].sum()
-        return float(given) / (area * duration)
-    if (boundary == "periodic").all():
-        kinetic = float(np.mean([ledger.kinetic_translational for ledger in window]))
-        virial = (after.virial - before.virial) / duration
-        return float((2.0 * kinetic + virial) / (3.0 * size.prod()))
-    return None
 
 
 def _figure(value: float) -> str:
