@@ -57,7 +57,6 @@ app = typer.Typer(
     cls=_OneLineUsage,
     help="From a scene file to a movie of particles that bounce as physics says they do, without a screen.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # help in plain text: rich takes longer to import than all the rest
 )
