@@ -9,6 +9,7 @@ from .geometry.shapes import Shape as Shape
 from .jobs.movie import render as render
 from .jobs.movie import simulate as simulate
 from .jobs.movie import still as still
+from .jobs.shards import join as join
 from .rendering import RenderError as RenderError
 from .scene import Scene as Scene
 from .scene.file import SceneError as SceneError

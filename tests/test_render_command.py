@@ -71,6 +71,7 @@ WRONG = [
     (["--scale", "0"], "--scale 0: must be a number above 0"),
     (["--scale", "1e-3x"], "--scale 1e-3x: must be a number above 0"),
     (["--scale", "1e9"], "--scale 1e9: would be 5,000,000,000; there may be up to 100,000,000"),
+    (["--shard", "1/2"], "--shard: only of a trajectory, such as 'particlesim simulate' makes of a scene"),
     (["--look", "none.toml"], "none.toml: no such file"),
 ]  # fmt: skip
 

@@ -15,6 +15,7 @@ from particlesim.cli.bench import measure_drawing, measure_steps
 from particlesim.cli.clean import clean
 from particlesim.cli.errors import fail, one_line_errors
 from particlesim.cli.info import info
+from particlesim.cli.join import join
 from particlesim.cli.options import MaxDrift, Quiet, Resume, SceneArgument, Threads
 from particlesim.cli.output import place_for
 from particlesim.cli.plot import plot
@@ -91,6 +92,9 @@ def _options(version: Version = False) -> None:
 
 
 app.command(short_help="Make a movie of a scene or of a trajectory.")(render)
+
+
+app.command(short_help="Make a movie of the parts that render --shard made.")(join)
 
 
 @app.command(short_help="Simulate a scene and write its trajectory.")

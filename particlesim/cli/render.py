@@ -14,7 +14,7 @@ import typer
 from particlesim.cli.errors import OptionError, one_line_errors
 from particlesim.cli.options import MaxDrift, Quiet, Resume, Threads
 from particlesim.cli.output import place_for
-from particlesim.cli.render_options import RenderOptions, frames_asked, scene_as_asked, still_time
+from particlesim.cli.render_options import RenderOptions, frames_asked, scene_as_asked, shard_asked, still_time
 from particlesim.cli.run import load, make_file
 
 if TYPE_CHECKING:
@@ -35,6 +35,10 @@ def render(
     ] = None,
     still: Annotated[
         str | None, typer.Option("--still", metavar="T", help="Make one picture (PNG), of the time T in seconds.")
+    ] = None,
+    shard: Annotated[
+        str | None,
+        typer.Option("--shard", metavar="K/N", help="Draw part K of N of a trajectory's movie, for 'join'."),
     ] = None,
     look: Annotated[
         Path | None,
@@ -63,11 +67,11 @@ def render(
     max_drift: MaxDrift = None,
 ) -> None:
     """Simulate a scene, or read a trajectory, and make a movie of it, with a poster (PNG) beside it."""
-    options = RenderOptions(frames, every, still, look, quality, size, camera, colour, scale)
+    options = RenderOptions(frames, every, still, shard, look, quality, size, camera, colour, scale)
     suffix, beside = (".mp4", (".png",)) if still is None else (".png", ())
     with (
         one_line_errors(source),
-        place_for(output, source, suffix, beside=beside) as path,
+        place_for(output, _named(source, shard_asked(options)), suffix, beside=beside) as path,
         _opened(source, options, quiet) as (subject, scene, total),
     ):
         time = still_time(scene.duration, options)
@@ -77,10 +81,15 @@ def render(
         from particlesim.jobs import movie  # noqa: PLC0415
 
         if time is None:
-            make = partial(movie.render, look=scene, frames=chosen, resume=resume)
+            make = partial(movie.render, look=scene, frames=chosen, shard=shard_asked(options), resume=resume)
         else:
             make = partial(movie.still, look=scene, time=time)
         make_file(make, subject, path, quiet, threads, max_drift)
+
+
+def _named(source: Path, shard: tuple[int, int] | None) -> Path:
+    """What the output is named after."""
+    return source if shard is None else source.with_stem(f"{source.stem}_{shard[0]}_of_{shard[1]}")
 
 
 @contextmanager

@@ -20,6 +20,7 @@ class RenderOptions(NamedTuple):
     frames: str | None
     every: str | None
     still: str | None
+    shard: str | None
     look: Path | None
     quality: str | None
     size: str | None
@@ -37,6 +38,8 @@ def scene_as_asked(scene: Scene, options: RenderOptions, *, of_trajectory: bool)
             raise OptionError("--scale: only of a scene, whose particles are yet to be placed")
         factor = _number("--scale", options.scale, "a number above 0", above=0.0)
         scene = _allowed("--scale", options.scale, lambda: scaled(scene, factor))
+    if options.shard is not None and not of_trajectory:
+        raise OptionError("--shard: only of a trajectory, such as 'particlesim simulate' makes of a scene")
     if options.look is not None:
         scene = _with_look_of(scene, options.look)
     if options.quality is not None:
@@ -70,11 +73,22 @@ def frames_asked(total: int, options: RenderOptions) -> range:
     return chosen
 
 
+def shard_asked(options: RenderOptions) -> tuple[int, int] | None:
+    """Which part (k, n) of the movie to draw, None for all of it. OptionError for what says no part."""
+    if options.shard is None:
+        return None
+    match = re.fullmatch(r"\s*(\d{1,9})\s*/\s*(\d{1,9})\s*", options.shard)
+    if not match:
+        raise OptionError(f"--shard {options.shard}: must be K/N, part K of N, such as 1/8")
+    number, of = map(int, match.groups())
+    return number, of
+
+
 def still_time(duration: float, options: RenderOptions) -> float | None:
     """The time of the still picture [s], None if a movie is wanted. OptionError if it is not in the scene."""
     if options.still is None:
         return None
-    for option, value in (("--frames", options.frames), ("--every", options.every)):
+    for option, value in (("--frames", options.frames), ("--every", options.every), ("--shard", options.shard)):
         if value is not None:
             raise OptionError(f"{option}: of a movie, not of the one picture that --still asks for")
     what = f"a time from 0 to {duration:g} s"

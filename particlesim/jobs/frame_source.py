@@ -42,6 +42,13 @@ class FrameSource(NamedTuple):
     phase: str  # what takes the time until the next
     simulation: Simulation | None = None  # where it is, while it gives frames
     trajectory: Trajectory | None = None  # that they are read from, if they are
+    begin: int = 0  # how many of the wanted ones lie before, in other parts of a movie; others may lie after ``total``
+
+    @property
+    def drawn(self) -> range:
+        """Numbers of the frames that are drawn here: the wanted ones, or the part of them."""
+        part = self.wanted[self.begin : self.total]
+        return part if len(part) < len(self.wanted) else self.wanted
 
 
 def frames_ahead(
@@ -80,18 +87,30 @@ def frame_source(
     threads: int | None,
     progress: Progress | None,
     run: PartialRun | None = None,
+    part: range | None = None,
 ) -> FrameSource:
     """All frames of a scene up to the last wanted one; of a trajectory those alone. None stands for all.
 
-    Those that ``run`` kept are left out, unless it kept no state of the simulation that gives them. ValueError for
-    frames that are not there.
+    Those that ``run`` kept are left out, unless it kept no state of the simulation that gives them. ``part``: places
+    among the wanted frames of a trajectory of those that are drawn here. ValueError for frames that are not there.
     """
     kept = run.kept["done"] if run is not None and run.kept else 0
     if isinstance(source, Trajectory):
         wanted = _among(wanted, len(source))
-        stored = ((k, source[k]) for k in wanted[kept:])
+        part = part or range(len(wanted))
+        stored = ((k, source[k]) for k in wanted[max(kept, part.start) : part.stop])
         header, first = source.header, source[0]
-        return FrameSource(source.scene, header, first, stored, len(wanted), wanted, "reading", trajectory=source)
+        return FrameSource(
+            source.scene,
+            header,
+            first,
+            stored,
+            part.stop,
+            wanted,
+            "reading",
+            trajectory=source,
+            begin=part.start,
+        )
     wanted = _among(wanted, source.frames)
     simulation = start(source, threads, progress)
     header, first = simulation.header, simulation.frame()

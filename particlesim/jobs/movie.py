@@ -11,6 +11,7 @@ from particlesim.jobs.frame_source import Progress, frame_source, frame_source_u
 from particlesim.jobs.partial_run import PartialRun
 from particlesim.jobs.pictures import Pictures, summary_of, timed
 from particlesim.jobs.provenance import as_tags, as_text, provenance
+from particlesim.jobs.shards import part_of, shard_table
 from particlesim.jobs.summary import Summary
 from particlesim.jobs.task import task_of
 from particlesim.rendering import write_image
@@ -87,6 +88,7 @@ def render(
     *,
     look: Scene | None = None,
     frames: range | None = None,
+    shard: tuple[int, int] | None = None,
     resume: bool = False,
     progress: Progress | None = None,
     threads: int | None = None,
@@ -103,6 +105,9 @@ def render(
         Draws a trajectory as this scene says, in place of its own.
     frames
         Numbers of the frames to draw, all if None; a scene is simulated from its start to the last of them.
+    shard
+        (k, n): only part k of n of the movie of a trajectory, 1 the first; ``join`` makes the movie of all parts. The
+        poster lies beside the one that has its picture.
     resume, progress, threads
         As for ``simulate``.
 
@@ -117,28 +122,32 @@ def render(
     TrajectoryError
         If the source is a file that is no trajectory, or damaged.
     ValueError
-        For frames that are not there.
+        For frames or a part that are not there.
     OutputError, PartialRunError, SceneError, SimulationError, OSError
         As for ``simulate``.
     """
     check_output(path, ".mp4", beside=(".png",))
     path = Path(path)
-    with opened(source) as movable, PartialRun(path, task_of(movable, look, frames), resume) as run:
+    with opened(source) as movable, PartialRun(path, task_of(movable, look, frames, shard), resume) as run:
+        part = None if shard is None else part_of(movable, frames, shard)
         platform.choose()
         _compile(movable, look, progress)
-        chosen = frame_source(movable, frames, threads, progress, run)
+        chosen = frame_source(movable, frames, threads, progress, run, part)
         scene = look or chosen.scene
         movie = scene.movie
         with (
             Pictures(chosen, scene, progress, run) as pictures,
-            Segments(run.folder, movie.fps, movie.size, movie.crf, pictures.summary.drawn) as segments,
+            Segments(run.folder, movie.fps, movie.size, movie.crf, pictures.summary.drawn, chosen.begin) as segments,
         ):
             for image in pictures.images(segments.flush):
                 segments.send(image)
-            origin = provenance(chosen.header, pictures.summary, chosen.wanted)
+            origin = provenance(chosen.header, pictures.summary, chosen.drawn)
+            if shard is not None and isinstance(movable, Trajectory):
+                origin["shard"] = shard_table(shard, movable, scene, chosen.wanted)
             segments.join(run.folder / "whole.mp4", as_tags(origin))
         pictures.summary.seconds["encoding"] = segments.seconds
-        write_image(path.with_suffix(".png"), pictures.poster, as_text(origin))
+        if pictures.poster.size:
+            write_image(path.with_suffix(".png"), pictures.poster, as_text(origin))
         os.replace(run.folder / "whole.mp4", path)
     return pictures.summary
 

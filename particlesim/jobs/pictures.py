@@ -39,9 +39,12 @@ class Pictures:
         self._source, self._movie, self._progress, self._run = source, scene.movie, progress, run
         self.summary = summary_of(scene, source.header)
         self._history = History().then(source.first.ledger)
-        self.poster = np.zeros((0, 0, 3), dtype=np.uint8)  # of the movie that images() gives
+        self.poster = np.zeros((0, 0, 3), dtype=np.uint8)  # of the movie that images() gives; a part may have none
         if run is not None and run.kept:
             self._go_on(run, run.kept["values"])
+        else:
+            self._pass_over(source.wanted[: source.begin])
+            self.summary.drawn = source.begin
         self._frames = timed(self.summary, source.phase, source.frames)
         # What is simulated ahead is not where the pictures are: such a run is simulated anew when it is gone on with.
         self._simulation = None if is_settled_by_frames(scene) else source.simulation
@@ -60,14 +63,15 @@ class Pictures:
     def images(self, flush: Callable[[], None] = lambda: None) -> Iterator[np.ndarray]:
         """The pictures of the movie, (h, w, 3) uint8, with its fades; all frames are taken into account on the way.
 
+        Of a part of a movie only its pictures are given, though all frames of the movie are taken into account.
+
         ``flush`` is called when all that came before is to be kept.
         """
         movie, summary, count = self._movie, self.summary, len(self._source.wanted)
         background = encoded(movie.background)
         while summary.frames < self._source.total:
             for image in self._drawers.draw(self._until_due()):
-                # A third of the way in, things have begun to happen.
-                if summary.drawn == count // 3:
+                if summary.drawn == poster_place(count):
                     self._keep_poster(image)
                 seen = strength(summary.drawn, count, movie.fade * movie.fps)
                 summary.drawn += 1
@@ -77,6 +81,16 @@ class Pictures:
             if self._run is not None and self._run.due():
                 flush()
                 self._keep(self._run)
+        self._pass_over(self._source.wanted[self._source.total :])
+        summary.drawn -= self._source.begin
+
+    def _pass_over(self, numbers: range) -> None:
+        """Take frames of a trajectory into account that another part of the movie draws."""
+        for k in numbers:
+            assert self._source.trajectory is not None
+            ledger = self._source.trajectory.ledger(k)
+            self.summary.add_moment(self._source.trajectory.time(k), ledger)
+            self._history = self._history.then(ledger)
 
     def _until_due(self) -> Iterator[tuple[Frame, History]]:
         """Frames to draw, each with what its readout needs of those before it, until something is to be kept."""
@@ -109,7 +123,14 @@ class Pictures:
 
     def _tell(self) -> None:
         """Say how many frames are done: those that have passed, but for the pictures that are yet to come."""
-        tell(self._progress, "rendering", self.summary.frames - len(self._drawers.waiting), self._source.total)
+        before = self._source.begin
+        done = self.summary.frames - len(self._drawers.waiting) - before
+        tell(self._progress, "rendering", done, self._source.total - before)
+
+
+def poster_place(pictures: int) -> int:
+    """Which picture of a movie is its poster: a third of the way in, things have begun to happen."""
+    return pictures // 3
 
 
 def summary_of(scene: Scene, header: Header) -> Summary:

@@ -110,8 +110,8 @@ def _digest(frame: Frame) -> str:
 def _of_trajectory(path: Path) -> Any:
     with Trajectory(path) as trajectory:
         summary = summary_of(trajectory.scene, trajectory.header)
-        for frame in trajectory:
-            summary.add(frame)
+        for k in range(len(trajectory)):
+            summary.add_moment(trajectory.time(k), trajectory.ledger(k))
         return {**provenance(trajectory.header, summary, range(len(trajectory))), "version": trajectory.version}
 
 

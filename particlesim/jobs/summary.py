@@ -47,10 +47,14 @@ class Summary:
 
     def add(self, frame: Frame) -> None:
         """Take a frame into account."""
-        self.times = (self.times[0] if self.frames else frame.time, frame.time)
+        self.add_moment(frame.time, frame.ledger)
+
+    def add_moment(self, time: float, ledger: Ledger | None) -> None:
+        """Take a frame into account of which only the time [s] and the ledger are read."""
+        self.times = (self.times[0] if self.frames else time, time)
         self.frames += 1
-        if frame.ledger is not None:
-            self._account(frame.ledger)
+        if ledger is not None:
+            self._account(ledger)
 
     def _account(self, ledger: Ledger) -> None:
         self._first = self._first or ledger

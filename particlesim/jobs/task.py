@@ -12,7 +12,12 @@ from particlesim.scene import Scene
 from particlesim.trajectory.gsd_file import Trajectory
 
 
-def task_of(source: Scene | Trajectory, look: Scene | None = None, frames: range | None = None) -> dict[str, Any]:
+def task_of(
+    source: Scene | Trajectory,
+    look: Scene | None = None,
+    frames: range | None = None,
+    shard: tuple[int, int] | None = None,
+) -> dict[str, Any]:
     """The keys of a scene, and what else its run or the drawing of a trajectory depends on."""
     if isinstance(source, Scene):
         table = _plain(source)
@@ -24,6 +29,8 @@ def task_of(source: Scene | Trajectory, look: Scene | None = None, frames: range
         table["look"] = _plain(look)
     if frames is not None:
         table["frames"] = [frames.start, frames.stop, frames.step]
+    if shard is not None:
+        table["shard"] = list(shard)
     return table
 
 

@@ -23,7 +23,7 @@ from particlesim.geometry.shapes import Shape, capsule, drawn_hull, principal_hu
 from particlesim.scene import Scene
 from particlesim.scene.file import stored_scene
 from particlesim.trajectory.foreign_gsd import FRAME_RATE, Foreign, check_same_particles, read_foreign
-from particlesim.trajectory.frames import Frame, Header
+from particlesim.trajectory.frames import Frame, Header, Ledger
 from particlesim.trajectory.gsd_chunks import Chunks, TrajectoryError, cut, reading
 from particlesim.trajectory.gsd_ledger import ledger_log, ledger_names, read_ledger
 from particlesim.trajectory.gsd_types import display_diameters, display_types
@@ -219,6 +219,13 @@ class Trajectory:
                 return k / FRAME_RATE
             return float(self._chunks.rows(_LOG + "time", 1, (0.0,), k)[0, 0])
 
+    def ledger(self, k: int) -> Ledger | None:
+        """The ledger of frame ``k`` alone, 0 the first; None where the file has none."""
+        if not 0 <= k < len(self):
+            raise IndexError(k)
+        with reading(self.path):
+            return read_ledger(self._chunks, k) if self._is_own else None
+
     def __getitem__(self, k: int) -> Frame:
         """Frame ``k``, 0 the first; positions and motion as the file stores them, in single precision."""
         if not 0 <= k < len(self):
@@ -243,7 +250,7 @@ class Trajectory:
                 angular_momentum=_world_momentum(each["angmom"], each["orientation"]),
                 image=each["image"].astype(np.int64),
                 impacts=self._chunks.rows(_IMPACTS, count, (0.0,), k)[:, 0].astype(np.int64),
-                ledger=read_ledger(self._chunks, k) if self._is_own else None,
+                ledger=self.ledger(k),
                 present=present,
             )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -36,13 +36,17 @@ class Segments:
         x264's constant rate factor, 0 (lossless) to 51 (smallest file).
     sent : int
         How many pictures of the movie were sent, and kept by ``flush``, before it was left.
+    first : int
+        The picture that a part of a movie begins with, which begins a segment.
     """
 
-    def __init__(self, folder: Path, fps: float, size: tuple[int, int], crf: int, sent: int = 0) -> None:
+    def __init__(
+        self, folder: Path, fps: float, size: tuple[int, int], crf: int, sent: int = 0, first: int = 0
+    ) -> None:
         self._folder, self._fps, self._size, self._crf = folder, fps, size, crf
         self._encoder: Encoder | None = None
         self._pictures: BinaryIO | None = None  # of the segment that is open
-        self.sent = sent
+        self.sent, self._first = sent, first
         self.seconds = 0.0  # spent encoding
         if sent % SEGMENT and not self._segment(sent // SEGMENT).exists():
             self._open(sent // SEGMENT, sent % SEGMENT)
@@ -76,22 +80,17 @@ class Segments:
             self._pictures.flush()
 
     def join(self, path: Path, tags: Mapping[str, str]) -> None:
-        """Write the whole movie to ``path`` with these tags. RenderError if it has no pictures or ffmpeg fails."""
-        if not self.sent:
+        """Write the whole movie, or part, to ``path`` with these tags.
+
+        RenderError if it has no pictures or ffmpeg fails.
+        """
+        if self.sent == self._first:
             raise RenderError(f"{path}: there are no frames to make a movie of")
         last = (self.sent - 1) // SEGMENT
         if self._encoder is not None:
             self._close(last)
-        names = [self._segment(number).name for number in range(last + 1)]
-        (self._folder / "segments.txt").write_text("".join(f"file {name}\n" for name in names))
-        command = [ffmpeg(), "-y", "-v", "error", "-f", "concat", "-i", "segments.txt", "-c", "copy"]
-        for name, text in tags.items():
-            command += ["-metadata", f"{name}={text}"]
-        command += ["-movflags", "+faststart", "-fflags", "+bitexact", "-f", "mp4", f"file:{path.absolute()}"]
-        # A session of its own: Ctrl-C is for us to handle.
-        done = subprocess.run(command, cwd=self._folder, capture_output=True, start_new_session=True, check=False)
-        if done.returncode:
-            raise failure(done.returncode, done.stderr)
+        names = [self._segment(number).name for number in range(self._first // SEGMENT, last + 1)]
+        join_files(self._folder, names, path, tags)
 
     def _segment(self, number: int) -> Path:
         return self._folder / f"{number:06}.mp4"
@@ -121,3 +120,30 @@ class Segments:
         self._encoder = self._pictures = None
         os.replace(self._part(number), self._segment(number))
         self._raw(number).unlink()
+
+
+def join_files(folder: Path, names: Sequence[str], path: Path, tags: Mapping[str, str]) -> None:
+    """Write movies in a folder, one after the other, to ``path`` with these tags. RenderError if ffmpeg fails."""
+    (folder / "segments.txt").write_text("".join(f"file {name}\n" for name in names))
+    command = ["-y", "-f", "concat", "-i", "segments.txt", "-c", "copy"]
+    for name, text in tags.items():
+        command += ["-metadata", f"{name}={text}"]
+    # Without the bit rate, which would tell of the files that it was joined from, and how often.
+    command += ["-movflags", "+faststart", "-write_btrt", "0", "-fflags", "+bitexact", "-f", "mp4"]
+    command += [f"file:{path.absolute()}"]
+    done = _ffmpeg(command, folder)
+    if done.returncode:
+        raise failure(done.returncode, done.stderr)
+
+
+def pictures_in(path: Path) -> int:
+    """How many pictures of a movie can be read, without decoding them."""
+    done = _ffmpeg(["-i", f"file:{path.absolute()}", "-c", "copy", "-f", "framecrc", "-"], path.parent)
+    # A line each; lines about all of them begin with a number sign.
+    return sum(not line.startswith(b"#") for line in done.stdout.splitlines())
+
+
+def _ffmpeg(arguments: Sequence[str], folder: Path) -> subprocess.CompletedProcess[bytes]:
+    # A session of its own: Ctrl-C is for us to handle.
+    command = [ffmpeg(), "-v", "error", *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, start_new_session=True, check=False)
