@@ -21,6 +21,7 @@ from particlesim.cli.output import place_for
 from particlesim.cli.plot import plot
 from particlesim.cli.render import render
 from particlesim.cli.run import load, make_file
+from particlesim.cli.sweep import sweep
 from particlesim.cli.tables import print_report, print_table
 from particlesim.core.interrupts import raise_signals
 from particlesim.core.output_path import check_output
@@ -214,6 +215,7 @@ def doctor() -> None:
         fail("\n".join(missing), 1)
 
 
+app.command(short_help="Simulate many cases of a scene.")(sweep)
 app.command(short_help="Draw figures of a run, and write its numbers.")(plot)
 app.command(short_help="Say where a movie, a picture or a trajectory comes from.")(info)
 app.command(short_help="Show partial runs, and remove them.")(clean)

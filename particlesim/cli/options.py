@@ -8,10 +8,10 @@ from typing import Annotated
 import typer
 
 
-def _at_least_one(threads: int | None) -> int | None:
-    if threads is not None and threads < 1:
+def _at_least_one(count: int | None) -> int | None:
+    if count is not None and count < 1:
         raise typer.BadParameter("must be 1 or more")
-    return threads
+    return count
 
 
 def _not_negative(drift: float | None) -> float | None:
@@ -24,6 +24,13 @@ SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene fi
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Threads = Annotated[
     int | None, typer.Option("--threads", callback=_at_least_one, help="Threads to simulate with.  [default: all]")
+]
+WorkerCount = Annotated[
+    int | None,
+    typer.Option("--workers", metavar="N", callback=_at_least_one, help="Processes of this machine to share it among."),
+]
+Scheduler = Annotated[
+    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler whose workers do it instead.")
 ]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with a partial run of the same, if there is one.")]
 MaxDrift = Annotated[

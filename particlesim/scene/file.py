@@ -17,19 +17,23 @@ _LARGEST = 20_000_000
 
 def load_scene(path: str | Path) -> Scene:
     """Read and check a scene file (TOML). SceneError, in one line, if it cannot be read or is wrong."""
+    return parse_scene(load_table(path), path)
+
+
+def load_table(path: str | Path) -> dict[str, Any]:
+    """What a TOML file says, as plain values. SceneError, in one line, if it cannot be read or is no TOML."""
     path = Path(path)
     text = _text(path)
     if not text.strip():
         raise SceneError("the file is empty", file=path)
     try:
-        table = tomllib.loads(text)
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"not valid TOML: {error}", file=path) from None
     except RecursionError:
         raise SceneError("not valid TOML: brackets within brackets without end", file=path) from None
     except ValueError:  # Python reads no whole number of more than some thousand digits
         raise SceneError("not valid TOML: a number of thousands of digits", file=path) from None
-    return parse_scene(table, path)
 
 
 def parse_scene(table: dict[str, Any], path: str | Path | None = None) -> Scene:

@@ -86,7 +86,9 @@ def _find(location: tuple[str | int, ...], table: dict[str, Any], model: type[Ba
             inside = isinstance(spot.value, list | tuple) and step < len(spot.value)
             spot = _Spot((*spot.keys, step), spot.value[step], spot.models) if inside else spot
         elif isinstance(spot.value, dict) and step in spot.value:
-            models = _models_in(spot.models[0].model_fields[step].annotation)
+            # In a table whose keys are the file's own, the models are those of its values.
+            field = spot.models[0].model_fields.get(step)
+            models = spot.models if field is None else _models_in(field.annotation)
             spot = _Spot((*spot.keys, step), spot.value[step], models)
     return spot
 

@@ -1,0 +1,1 @@
+"""Sweeps: a scene case by case, each summed up as one row of a table, and figures of the rows."""
