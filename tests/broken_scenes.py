@@ -292,7 +292,7 @@ BROKEN = [
     (group(count="90_000_000_000", size="1e-9"), f"particles[0].count = 90000000000: {COUNT}"),
     (
         group(count="1000", placement='{ kind = "cluster", spread = 0.05, centres = [[0, 0, 0]] }'),
-        "particles[0].count = 1000: no room for 990 of them at random, which fills about 0.3 of it: fewer or smaller particles, a wider spread",
+        "particles[0].count = 1000: no room for 990 of them in clusters, which are filled to about 0.3: fewer or smaller particles, a wider spread",
     ),
     (
         group(placement='{ kind = "cluster", spread = 1, centres = [[9, 0, 0]] }'),
@@ -334,9 +334,9 @@ BROKEN = [
         "particles[0].placement.spacing = 0.9: makes a lattice of 1 points here, for 10 particles",
     ),
     (
-        group(count="60", placement=f'{{ kind = "random", region = {{ {ROUND} }} }}'),
-        "particles[0].count = 60: no room for 23 of them at random, which fills about 0.3 of it: "
-        "fewer or smaller particles, more room, or a lattice (spheres: up to 0.52)",
+        group(count="90", placement=f'{{ kind = "random", region = {{ {ROUND} }} }}'),
+        "particles[0].count = 90: no room for all of them at random: they would fill 0.72 of their room, "
+        "where 0.5 is reached: fewer or smaller particles, or more room",
     ),
     (
         group(placement=f'{{ kind = "cluster", spread = 1, centres = [[0.4, 0.4, 0.4]], region = {{ {ROUND} }} }}'),

@@ -58,12 +58,19 @@ def build(scene: Scene, obstacles: Sequence[Obstacle] = ()) -> Model:
     particles["orientation"] = _orientations(scene, shapes, particles, randoms)
     to_come = particles[particles["group"] >= len(scene.particles)]
     particles = particles[particles["group"] < len(scene.particles)]
-    _check_volume(scene, domain[0], shapes, particles)
+    volume = _volumes(shapes, particles)
+    _check_volume(scene, domain[0], volume)
     own = obstacles_of(scene)
     model = assemble(shapes, particles, domain, materials_of(scene), [*own, *obstacles], pair_laws_of(scene))
     model = model._replace(obstacle_shapes=drawn_shapes(scene, own), fields=fields_of(scene))
     set_in_motion(scene, to_come, randoms)
-    crowd = Crowd(*(np.ascontiguousarray(particles[name]) for name in ("shape_row", "group", "scale", "radius")))
+    crowd = Crowd(
+        shape=np.ascontiguousarray(particles["shape_row"]),
+        group=np.ascontiguousarray(particles["group"]),
+        size=np.ascontiguousarray(particles["scale"]),
+        radius=np.ascontiguousarray(particles["radius"]),
+        volume=volume,
+    )
     particles = model.particles
     place_kinematic(model.system.body, model.system.motion, 0.0)
     table = model.system.shapes, obstacles_among(model.system)
@@ -218,10 +225,14 @@ def _check_sizes(scene: Scene, domain: np.void, particles: np.ndarray) -> None:
                 raise SceneError(wrong + unit_hint(group), _key(scene, g, "size"), value)
 
 
-def _check_volume(scene: Scene, domain: np.void, shapes: list[Shape], particles: np.ndarray) -> None:
-    """What is enclosed must have room."""
-    volumes = np.array([s.volume for s in shapes])[particles["shape_row"]] * particles["scale"] ** 3
-    fill = float(volumes.sum() / (domain["upper"] - domain["lower"]).prod())
+def _volumes(shapes: list[Shape], particles: np.ndarray) -> np.ndarray:
+    """Volumes of particles (n,) BODY, (n,) [m^3]."""
+    return np.array([s.volume for s in shapes])[particles["shape_row"]] * particles["scale"] ** 3
+
+
+def _check_volume(scene: Scene, domain: np.void, volume: np.ndarray) -> None:
+    """Particles, whose volumes (n,) [m^3] are given, must have room in a closed world."""
+    fill = float(volume.sum() / (domain["upper"] - domain["lower"]).prod())
     if fill > 1.0 and not (domain["boundary"] == OPEN).any():
         hints = [unit_hint(group) for group in scene.particles]
         wrong = f"do not fit: their volumes add up to {fill:.3g} times the world's"

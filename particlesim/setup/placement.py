@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from particlesim.geometry.aabb import aabbs_of
-from particlesim.geometry.shape_table import ShapeTable
 from particlesim.scene import Scene
 from particlesim.scene.file import SceneError
 from particlesim.scene.groups import (
@@ -19,11 +18,12 @@ from particlesim.scene.groups import (
     RandomPlacement,
     Region,
 )
+from particlesim.setup.overlap_relaxation import Known, push_apart
 from particlesim.setup.random_insertion import Insertion, empty_space, refile, try_in_place
 from particlesim.setup.space import Crowd, Space
 
-# Random trials a particle before it is said not to fit. Equal spheres jam at a fill of 0.38 (J. Feder, J. Theor. Biol.
-# 87 (1980) 237-254); a fill of 0.3 takes the last of 10^5 of them 6000.
+# Random trials a particle before it finds no room. Equal spheres jam at a fill of 0.38 (J. Feder, J. Theor. Biol. 87
+# (1980) 237-254); a fill of 0.3 takes the last of 10^5 of them 6000.
 _MAX_TRIALS = 30_000
 
 # Trials a call, where few particles are left and each gets several at once.
@@ -35,9 +35,8 @@ _CROWD = 50
 _FIRST_LOOK = 128
 _PLACED_BY_DOUBLING = 1.0 / 6.0
 
-
-# The shapes that there are, and the obstacles, (k,) BODY.
-Known = tuple[ShapeTable, np.ndarray]
+# To say how much there is room for, particles are made smaller by this factor, again and again, down to _SMALLEST.
+_SHRINKAGE, _SMALLEST = 0.97, 0.5
 
 
 def unit_hint(group: Group) -> str:
@@ -57,7 +56,7 @@ def positions(
     """Positions of all particles of a scene, (n, 3) [m]. SceneError if a group does not fit.
 
     Lists and lattices come first; the rest is put between them at random, the largest particles first, and not into
-    obstacles.
+    obstacles. What finds no room is put anywhere, and then all that is at random makes room for each other.
     """
     insertion = empty_space(crowd, world, orientation)
     position, level = insertion.body["position"], insertion.body["level"]
@@ -74,21 +73,29 @@ def positions(
         for g, (group, members) in enumerate(zip(scene.particles, groups, strict=True))
         if isinstance(group.placement, RandomPlacement | ClusterPlacement) and len(members)
     }
-    in_place = np.flatnonzero(~np.isin(crowd.group, list(inserted)))
+    in_place, jammed = np.flatnonzero(~np.isin(crowd.group, list(inserted))), []
     for number in range(len(insertion.level) - 1, -1, -1):
         if (level[in_place] < number).any() or number == len(insertion.level) - 1:
             refile(insertion, in_place, number)
         for g, trials in inserted.items():
             members = groups[g][level[groups[g]] == number]
             left = _insert(known, insertion, trials, members)
-            if left:
-                raise _no_room(g, scene.particles[g], left)
+            if len(left) and isinstance(scene.particles[g].placement, ClusterPlacement):
+                raise _no_room_in_clusters(g, scene.particles[g], len(left))
+            if len(left):
+                position[left] = trials.draw(left)
+                jammed.append(g)
             in_place = np.concatenate([in_place, members])
+    if jammed:
+        factor = _make_room(known, insertion, (below, above), [t for t in inserted.values() if not t.in_clusters])
+        if factor < 1.0:
+            g = jammed[0]
+            raise _no_room(g, scene.particles[g], inserted[g].fill(position, crowd.volume), factor)
     return np.ascontiguousarray(position)
 
 
-def _insert(known: Known, insertion: Insertion, trials: Trials, left: np.ndarray) -> int:
-    """Put the particles of ``left`` (m,) at random between those in place; how many found no room."""
+def _insert(known: Known, insertion: Insertion, trials: Trials, left: np.ndarray) -> np.ndarray:
+    """Put the particles of ``left`` (m,) at random between those in place; those that found no room."""
     before, look, tried = len(left), _FIRST_LOOK, 0
     while len(left) and tried < _MAX_TRIALS:
         each = max(_TRIALS_A_CALL // len(left), 1)
@@ -99,15 +106,42 @@ def _insert(known: Known, insertion: Insertion, trials: Trials, left: np.ndarray
             if look > _FIRST_LOOK and len(left) > max(_CROWD, (1.0 - _PLACED_BY_DOUBLING) * before):
                 break
             before, look = len(left), 2 * look
-    return len(left)
+    return left
 
 
-def _no_room(g: int, group: Group, left: int) -> SceneError:
-    is_cluster = isinstance(group.placement, ClusterPlacement)
-    wider = "a wider spread" if is_cluster else "more room, or a lattice (spheres: up to 0.52)"
-    none = f"no room for {left:,} of them at random, which fills about 0.3 of it"
-    message = f"{none}: fewer or smaller particles, {wider}"
+def _make_room(
+    known: Known, insertion: Insertion, extent: tuple[np.ndarray, np.ndarray], at_random: list[Trials]
+) -> float:
+    """Push apart what is placed ``at_random``. By which factor on its sizes there is room: 1 at its own, 0 if none."""
+    body = insertion.body
+    position, movable = body["position"], np.zeros(len(body), dtype=np.bool_)
+    for trials in at_random:
+        movable[trials.members] = True
+
+    def bring_back() -> None:
+        for trials in at_random:
+            position[trials.members] = trials.bring_back(position[trials.members])
+
+    factor = 1.0
+    while not push_apart(known, insertion, extent, movable, bring_back):
+        factor *= _SHRINKAGE
+        if factor < _SMALLEST:
+            return 0.0
+        for sizes in (body["scale"], body["radius"], *extent):
+            sizes[movable] *= _SHRINKAGE
+    return factor
+
+
+def _no_room(g: int, group: Group, asked: float, factor: float) -> SceneError:
+    reached = f"{factor**3 * asked:.2g} is reached" if factor else "next to nothing is reached"
+    fills = f"they would fill {asked:.2g} of their room, where {reached}"
+    message = f"no room for all of them at random: {fills}: fewer or smaller particles, or more room"
     return SceneError(message, f"particles[{g}].count", group.number)
+
+
+def _no_room_in_clusters(g: int, group: Group, left: int) -> SceneError:
+    none = f"no room for {left:,} of them in clusters, which are filled to about 0.3"
+    return SceneError(f"{none}: fewer or smaller particles, a wider spread", f"particles[{g}].count", group.number)
 
 
 def _bounds(region: Region | None, world: Space) -> tuple[np.ndarray, np.ndarray]:
@@ -242,11 +276,12 @@ class Trials:
         random: np.random.Generator,
     ) -> None:
         self._where, self._random = where, random
-        lower, upper = _bounds(where.region, world)
+        self.members, self.in_clusters = members, isinstance(where, ClusterPlacement)
+        lower, upper = self._bounds = _bounds(where.region, world)
         # A particle stays within its region, but where a region spans a periodic world only its centre does.
-        free = (world.period > 0.0) & (lower <= world.lower) & (upper >= world.upper)
-        self._lower = lower - np.where(free, 0.0, extent[0])
-        self._upper = upper - np.where(free, 0.0, extent[1])
+        self._free = (world.period > 0.0) & (lower <= world.lower) & (upper >= world.upper)
+        self._lower = lower - np.where(self._free, 0.0, extent[0])
+        self._upper = upper - np.where(self._free, 0.0, extent[1])
         self._centres = np.zeros((0, 3))
         if isinstance(where, ClusterPlacement):
             self._centres = _centres(key, where, (lower, upper), int(members.max()) + 1, random)
@@ -268,8 +303,25 @@ class Trials:
             if not outside.any():
                 return points
             points[outside] = self._proposed(indices[outside], lower[outside], upper[outside])
+        return self._cut_off(points, lower, upper)
+
+    def bring_back(self, points: np.ndarray) -> np.ndarray:
+        """Positions (m, 3) of the members, or the nearest to them where they may be."""
+        back = self._cut_off(points, self._lower[self.members], self._upper[self.members])
+        return back if _is_round(self._where.region) else np.where(self._free, points, back)
+
+    def fill(self, position: np.ndarray, volume: np.ndarray) -> float:
+        """Which part of the region is filled by particles at ``position`` (n, 3) [m], of ``volume`` (n,) [m^3]."""
+        lower, upper = self._bounds
+        inside, room = ((position >= lower) & (position <= upper)).all(axis=1), (upper - lower).prod()
+        if _is_round(self._where.region):
+            inside, room = from_middle(position, lower, upper) <= 1.0, room * np.pi / 6.0
+        return float(volume[inside].sum() / room)
+
+    def _cut_off(self, points: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+        """Points (m, 3), those outside moved to where the region ends."""
         points = np.clip(points, lower, upper)
-        if is_round:
+        if _is_round(self._where.region):
             middle = 0.5 * (lower + upper)
             points = middle + (points - middle) / np.maximum(from_middle(points, lower, upper), 1.0)[:, None]
         return points

@@ -14,6 +14,7 @@ class Crowd(NamedTuple):
     group: np.ndarray  # int64, entry of the scene's particles
     size: np.ndarray  # factor on the shape of size 1
     radius: np.ndarray  # bounding sphere [m]
+    volume: np.ndarray  # [m^3]
 
 
 class Space(NamedTuple):
