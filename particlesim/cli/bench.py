@@ -1,10 +1,10 @@
-"""The two benchmarks: whole time steps, and pictures."""
+"""The benchmarks: whole time steps, heaps that come to rest, and pictures."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from particlesim.cli.tables import print_pictures, print_speeds
+from particlesim.cli.tables import print_heaps, print_pictures, print_speeds
 
 
 def measure_steps(large: bool, figures: Path | None, quiet: bool, threads: int | None) -> None:
@@ -31,3 +31,16 @@ def measure_drawing(large: bool, figures: Path | None, quiet: bool) -> None:
         write(figures, pictures)
     if not quiet:
         print_pictures(pictures)
+
+
+def measure_settling(large: bool, figures: Path | None, quiet: bool, threads: int | None) -> None:
+    """The same of heaps that come to rest."""
+    from particlesim.benchmarks.settling import COUNTS, LARGE, run, write  # noqa: PLC0415
+    from particlesim.cli.progress import shown_progress  # noqa: PLC0415
+
+    with shown_progress(quiet, "measurement") as progress:
+        heaps = list(run((*COUNTS, LARGE) if large else COUNTS, threads, progress))
+    if figures is not None:
+        write(figures, heaps)
+    if not quiet:
+        print_heaps(heaps)

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 import typer.core
 
-from particlesim.cli.bench import measure_drawing, measure_steps
+from particlesim.cli.bench import measure_drawing, measure_settling, measure_steps
 from particlesim.cli.clean import clean
 from particlesim.cli.errors import fail, one_line_errors
 from particlesim.cli.info import info
@@ -181,6 +181,7 @@ def compare(
 def bench(
     large: Annotated[bool, typer.Option("--large", help="Measure a million particles as well.")] = False,
     drawing: Annotated[bool, typer.Option("--drawing", help="Measure the drawing of pictures instead.")] = False,
+    resting: Annotated[bool, typer.Option("--resting", help="Measure heaps that come to rest instead.")] = False,
     figures: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the figures to a file as well.")
     ] = None,
@@ -192,12 +193,16 @@ def bench(
     They are in a periodic box at unit temperature. In a step a particle moves a twentieth of its radius on average.
 
     With --drawing, measure how long a picture of 1280x720 pixels takes, beside VTK where it is installed.
+
+    With --resting, measure how long mixed bodies that are dropped into a box take, beside Rapier where it is installed.
     """
     with one_line_errors(Path("bench")):
         if figures is not None:
             check_output(figures, ".json")
         if drawing:
             measure_drawing(large, figures, quiet)
+        elif resting:
+            measure_settling(large, figures, quiet, threads)
         else:
             measure_steps(large, figures, quiet, threads)
 

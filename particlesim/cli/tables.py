@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from particlesim.benchmarks.broad_phase.command import Report
     from particlesim.benchmarks.drawing import Drawn
+    from particlesim.benchmarks.settling import Settled
     from particlesim.benchmarks.steps import Speed
     from particlesim.jobs.summary import Summary
 
@@ -87,6 +88,26 @@ def print_pictures(pictures: list[Drawn]) -> None:
     console = Console()
     console.print(table)
     console.print("medians; ours with shadows and smooth edges, VTK without", style="dim", highlight=False)
+
+
+def print_heaps(heaps: list[Settled]) -> None:
+    """What a benchmark of heaps measured: a row for each engine and number of bodies."""
+    from rich.console import Console  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+
+    from particlesim.benchmarks.settling import PIECE  # noqa: PLC0415
+
+    table = Table(title="Seconds for a simulated second", title_justify="left", box=None, pad_edge=False)
+    pieces = [f"to {PIECE * (k + 1):g} s" for k in range(len(heaps[0].seconds))]
+    for name in ("", "bodies", "mean", *pieces, "overlap"):
+        table.add_column(name, justify="right" if name else "left", no_wrap=True)
+    for heap in heaps:
+        overlap = f"{max(heap.overlaps):.1e}" if heap.overlaps else ""
+        each = (f"{seconds:.2f}" for seconds in heap.seconds)
+        table.add_row(heap.engine, f"{heap.bodies:,}", f"{heap.mean:.2f}", *each, overlap)
+    console = Console()
+    console.print(table)
+    console.print("overlap: the deepest after any piece, in sizes", style="dim", highlight=False)
 
 
 def print_summary(summary: Summary, path: Path) -> None:
