@@ -5,7 +5,9 @@ import pytest
 
 from particlesim.core.constants import MAX_MANIFOLD
 from particlesim.core.math3d import quat_to_matrix
-from particlesim.dynamics.contact.contact_points import CONTACT_POINT, handed_down
+from particlesim.dynamics.contact.contact_records import CONTACT_POINT, CONTACT_TERMS
+from particlesim.dynamics.contact.island_step import Islands
+from particlesim.dynamics.contact.lasting_islands import warm_start
 from particlesim.dynamics.solver_state import FORCE
 from particlesim.geometry import shapes
 from particlesim.geometry.narrow_phase.contact_manifold import contact_manifold
@@ -36,6 +38,12 @@ def only_falls(ledgers):
     """Whether no energy is gained, but for what is left where the impulses are no longer made better (settling.py)."""
     energies = np.array([ledger.energy for ledger in ledgers])
     return (np.diff(energies) <= 1e-11 * energies[0]).all()
+
+
+def energy_unaccounted(ledgers):
+    """What the energies at the start and in the end, and what was dissipated, do not add up to, as a fraction."""
+    first, last = ledgers[0], ledgers[-1]
+    return abs(last.energy + last.dissipated.sum() - first.energy) / first.energy
 
 
 def momentum_unaccounted(sim, ledgers):
@@ -96,6 +104,7 @@ def test_a_heap_of_all_shapes_calms_down():
     assert sim.ledger.kinetic < 0.02 * max(ledger.kinetic for ledger in ledgers)
     assert overlap < 1e-4 * 0.2
     assert momentum_unaccounted(sim, ledgers) < 1e-12
+    assert energy_unaccounted(ledgers) < 1e-6
 
 
 def test_a_heap_thrown_together_is_worked_through():
@@ -108,17 +117,17 @@ def test_a_heap_thrown_together_is_worked_through():
 
 def test_forces_go_to_the_nearest_points_of_the_same_contact():
     """The corners of a patch come in any order, and may be fewer or more than before; no force is lost."""
-    point = np.zeros(4, dtype=CONTACT_POINT)
-    point["lever_a"][:, 0] = 5.0, 1.0, 2.0, 1.1
-    contact, before = np.array([7, 3, 3, 9]), np.array([3, 3, 3, 8, 7])
-    memory = np.zeros(5, dtype=FORCE)
-    memory["lever"][:, 0] = 2.1, 1.2, 0.8, 5.0, -4.0
-    memory["force"] = 10.0, 20.0, 30.0, 40.0, 50.0
-    order = np.argsort(contact, kind="stable")
-    first = np.searchsorted(contact, before, sorter=order)
-    last = np.searchsorted(contact, before, side="right", sorter=order)
-    forces = handed_down(point, order, first, last, memory)
-    assert forces.tolist() == [50.0, 50.0, 10.0, 0.0]
+    points, terms = np.zeros(4, dtype=CONTACT_POINT), np.zeros(4, dtype=CONTACT_TERMS)
+    points["a"], points["b"] = [0, 0, 1, 2], [3, 3, 7, 9]
+    points["arm_a"][:, 0] = 1.0, 2.0, 5.0, 1.1
+    before = np.zeros(5, dtype=FORCE)
+    before["contact"] = np.array([3, 3, 3, 8, 17])
+    before["arm"][:, 0] = 2.1, 1.2, 0.8, 5.0, -4.0
+    before["force"][:, 2] = before["torque"][:, 1] = 10.0, 20.0, 30.0, 40.0, 50.0
+    bounds = np.array([0, 4])
+    warm_start(Islands(bounds, points, terms, bounds, np.arange(4), np.zeros(1)), before, 10)
+    assert terms["force"][:, 2].tolist() == [50.0, 10.0, 50.0, 0.0]
+    assert terms["torque"][:, 1].tolist() == [50.0, 10.0, 50.0, 0.0]
 
 
 def test_a_heap_is_the_same_for_every_broad_phase_and_number_of_threads():

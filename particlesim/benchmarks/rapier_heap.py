@@ -29,7 +29,7 @@ def rapier_world(model: Model, friction: float, restitution: float, threads: int
         axis, upper = divmod(int(wall["wall"]), 2)
         normal = [0.0, 0.0, 0.0]
         normal[axis] = 1.0 - 2.0 * upper
-        world.add_collider(Collider.halfspace(tuple(normal), translation=tuple(wall["position"].tolist()), **surface))
+        world.add_collider(Collider.halfspace(normal, translation=wall["position"].tolist(), **surface))
     for b in model.particles:
         collider = _collider(model.shapes[b["shape_row"]], float(b["scale"]), density=1000.0, **surface)
         turned = Isometry3(Vec3(*b["position"].tolist()), Rotation3(*b["orientation"].tolist()))

@@ -110,9 +110,11 @@ PATCH_ACCEPTED = 1e-6
 IDLE_SWEEPS = 60
 SHORTER_SWEEPS = 0.7
 
-# Impacts of an island within one substep, for each of its bodies, before the substep is cut; and the same for slow
-# impacts of what comes to rest: the next substep takes all their contacts together.
+# Impacts of an island within one substep, for each of its bodies, before the substep is cut; before its bodies are in
+# lasting contact, where impacts lose energy: an infinite sequence of them may have begun; and the same for slow impacts
+# of what comes to rest: the next substep takes all their contacts together.
 MAX_IMPACTS = 1000
+FEW_IMPACTS = 16
 MAX_SLOW_IMPACTS = 100
 
 # Bodies that touch and part, or hardly move, may sink into each other by this fraction of their sizes before they
@@ -121,7 +123,7 @@ MAX_SLOW_IMPACTS = 100
 PENETRATION_SLOP = 4e-7
 RESTING_PENETRATION_SLOP = 1e-5
 
-# ---- resting contacts: which -----------------------------------------------------------------------------------------
+# ---- lasting contacts: which -----------------------------------------------------------------------------------------
 
 # Under gravity, what meets more slowly than by a fall from this fraction of its inscribed radius comes to rest [1]: its
 # bounces, if not ended, would be infinitely many in finite time, and are lower than can be seen. Larger: visible
@@ -130,6 +132,13 @@ RESTITUTION_THRESHOLD_HEIGHT = 1e-3
 
 # What rebounds in full rests only if it is this much slower and nearer than what does not [1]: energy is kept to 1e-14.
 LOSSLESS_REST = 1e-6
+
+# The longest substep where anything is in lasting contact, or falls and may come to be [s]: that of engines. Longer:
+# what is struck within it has moved at its new velocity from the start; shorter: more substeps.
+LASTING_STEP = 1.0 / 240.0
+
+# How often bodies of a substep that had too many impacts are put into lasting contact before it is bisected.
+MAX_LASTING_ROUNDS = 4
 
 # Faces and edges inclined by less than this rest on each other along a patch [sine]: about what a face is inclined by
 # when one of its edges lies and the other is a few threshold heights away. And by more than the second they never do,
@@ -140,66 +149,93 @@ MAX_PARALLEL_TOLERANCE = 0.2
 # Faces and edges reach this fraction of the inscribed radius beyond their borders at most [1]: what may slide there.
 MANIFOLD_MARGIN = 0.02
 
-# Contact points are looked for as far ahead as bodies come that are this much faster than expected [1]. Smaller: more
-# substeps are searched twice; larger: more contact points.
-SPEED_MARGIN = 2.0
+# Bodies may become faster than expected by this factor before contacts are searched again [1]; the fraction of a
+# neighbour's speed that a body is expected to take on, and by how many times the speed that gravity adds in a substep
+# it may become faster [1].
+SPEED_MARGIN = 1.5
+SPEED_HANDED_ON = 0.5
+SPEED_GAIN = 2.0
 
-# The fraction of a neighbour's speed that a body is expected to take on, and by how many times the speed that gravity
-# adds in a substep it may become faster [1]. With SPEED_MARGIN nearly all are foreseen; the rest costs a second search.
-SPEED_HANDED_ON = 0.3
-SPEED_GAIN = 4.0
+# Searches of contacts in a substep, until no body becomes faster than expected. Fewer: `unresolved` counts sooner.
+MAX_CONTACT_SEARCHES = 4
 
-# Searches of the active set in a substep, until no body becomes faster than expected; and of velocities in each, as
-# long as bodies would sink in with those that were found. Fewer: `unresolved` counts sooner.
-MAX_ACTIVE_SET_SEARCHES = 5
-MAX_CORRECTIONS = 5
+# ---- lasting contacts: the step --------------------------------------------------------------------------------------
 
-# While anything rests, surfaces of what is pressed move by this fraction of the inscribed radius in a substep [1]:
-# paths bend by its square. No substep is shorter for it than the second fraction of what it is where all lie still.
-RESTING_DISPLACEMENT = 0.01
-SHORTEST_RESTING_SUBSTEP = 0.25
+# Parts of a substep in which gravity acts and gaps are followed. More: stacks and heaps are held better by as many
+# sweeps in all, and first-order errors are smaller.
+RESTING_SUBSTEPS = 4
 
-# ---- resting contacts: the projected solver --------------------------------------------------------------------------
+# Pairs of sweeps over the contact points of an island in each part: as many as make this number of visits to points in
+# the substep, which takes two milliseconds, but no more than MAX_SWEEPS. Thus few points, such as those of a tower, are
+# done to rounding: all points that push are solved together after every second pair of sweeps, by so many steps of
+# conjugate gradients at most. Points whose friction is within this fraction of its limit slide [1]; a way is cut short
+# by halves down to the last fraction where it leads out of a cone.
+SWEEP_VISITS = 40_000
+MAX_SWEEPS = 400
+GRADIENT_STEPS = 60
+STICKING = 1e-9
+LEAST_SHARE = 1e-3
 
-# Sweeps over all contact points in a substep: as many as make this number of visits to points, which takes a
-# millisecond, but MIN_SWEEPS at least. Thus few points, such as those of a tower, are done to rounding; a large heap
-# starts from the forces of the substep before and gets better from one to the next. There are more sweeps while some
-# point would sink in farther than it may by more than a fraction URGENT_PENETRATION of the inscribed radius. Hardly a
-# substep needs MAX_SWEEPS: of a pour of 2,001 bodies one in ten thousand.
-SWEEP_VISITS = 30_000
-MIN_SWEEPS = 12
-MAX_SWEEPS = 500
-URGENT_PENETRATION = 2.4e-5
+# Where that leaves FEW_SWEEPS pairs or less, there are twice as many single sweeps as the second, along conjugate
+# ways: a large heap starts from the forces of the substep before and gets better from one to the next. So few has a
+# second answer, too, where impulses could grow for as long as they are looked for.
+FEW_SWEEPS = 4
+CONJUGATE_SWEEPS = 20
 
-# Sweeps end when no normal velocity changes by more than this fraction of what gravity adds in the substep [1].
-SWEEP_CONVERGED = 1e-9
+# Impulses that do less together than this fraction of what each does alone cancel each other [1].
+SAME_IMPULSES = 1e-11
 
-# Energy gained, as a fraction of what lifts all bodies by their radii, that is rounding [1].
-ENERGY_ROUNDING = 1e-13
+# Sweeps end when no velocity changes by more than this fraction of what gravity adds, or points approach by [1].
+SWEEP_CONVERGED = 1e-10
+
+# In large islands they end, too, when that velocity comes to less than this fraction of the smallest inscribed radius
+# in a part of the substep [1]: a fifth of the depth that is corrected.
+NEAR_SWEEP_CONVERGED = 2e-5
+
+# A last sweep that changes a velocity by more than this fraction of what gravity adds in a substep has left something
+# undone that counts [1].
+UNRESOLVED_VELOCITY = 1.0
 
 # Bodies come to rest this fraction of the inscribed radius apart [1]. What sweeps leave undone they sink into this
-# slack first, and into each other by DEEPEST_REST and a few times URGENT_PENETRATION. Neither can be seen; what touches
-# is nearer than the threshold height. In one substep a point may sink by SLACK_SHARE of what is left to it. Where
-# nothing is left, all but a tenth of what URGENT_PENETRATION leaves free is taken away: in a heap nearly at rest
-# nothing gives the energy to lift what has sunk.
+# slack first. It cannot be seen; what touches is nearer than the threshold height.
 REST_SLACK = 2e-4
-DEEPEST_REST = 3e-5
-SLACK_SHARE = 0.25
-LEAST_SLACK = -0.9 * URGENT_PENETRATION
 
-# Contact points that have sunk in are lifted by this fraction of their depth in a substep [1]. 1 would make heaps jump.
-LIFT_SHARE = 0.2
+# Turning bends paths, and so closes gaps sooner than velocities say: what it may close is kept free, up to this
+# fraction of the inscribed radius [1].
+MAX_TURNING_SLACK = 0.05
 
-# ---- resting contacts: correction at the end of the substep ----------------------------------------------------------
+# Bodies may be in each other by this fraction of the inscribed radius at the end of a substep [1]. Those that would be
+# deeper are pushed apart in so many rounds, each by the third fraction of the inscribed radius at most: contacts are
+# known of bodies that are so much nearer than they move. What was deeper before comes out by the last.
+CORRECTED_DEPTH = 1e-4
+CORRECTION_ROUNDS = 20
+MAX_CORRECTION = 0.1
+LIFT_SHARE = 0.3
 
-# Velocities are sought anew for bodies that end up overlapping by this fraction of the inscribed radius, and by the
-# second more than they are [1]: what overlaps already is commonly let sink by less than that in a substep.
-CORRECTED_PENETRATION = 1e-4
-CORRECTED_SINKING = 4e-5
+# What would still be deeper than this fraction of the inscribed radius is held back [1]: a few times in proportion,
+# then it stays where it was. Smaller: heaps in motion falter.
+HELD_BACK_DEPTH = 1e-3
+TIMES_HELD_BACK = 4
 
-# Gaps differ from what was expected by less than this fraction of the displacement of surfaces against each other [1]:
-# more than what features of a manifold are inclined by, and commonly more than bodies turn by in a substep.
-GAP_MISJUDGED = 0.3
+# Bodies that have turned by less in a substep [rad] have moved as if they turned with their velocities of the start.
+SMALL_TURN = 1e-3
+
+# A normal is that of a face if the cosine between them is nearer to 1 than this [1].
+SAME_NORMAL = 1e-9
 
 # Vertices that reach as far as the farthest but for this fraction of the size reach as far [1].
 LEVEL_VERTICES = 1e-6
+
+# Edges that cross at less than this angle [sine] turn their normal too fast to be followed.
+MIN_EDGE_SINE = 0.05
+
+# Gaps that differ by this fraction of the inscribed radius are the same [1].
+GAP_ROUNDING = 1e-9
+
+# How often bodies are looked for that were struck, and so have moved at their new velocity: those next to them follow.
+MEAN_VELOCITY_ROUNDS = 8
+
+# Energy gained, as a fraction of the kinetic energy and what lifts all bodies by their radii, that is rounding [1]; and
+# steps in which the impulses are found that gain none.
+ENERGY_ROUNDING = 1e-13
+ENERGY_STEPS = 12

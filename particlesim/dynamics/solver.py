@@ -16,6 +16,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from particlesim.core.constants import DISSIPATION
 from particlesim.core.parallel import ThreadTeam
 from particlesim.dynamics.advance import advance, sum_speeds, time_within_skins
 from particlesim.dynamics.ccd.swept_bounds import BOUND
@@ -41,8 +42,12 @@ from particlesim.dynamics.neighbour_list import (
 from particlesim.dynamics.scales import periodic_room, set_tolerances, time_for
 from particlesim.dynamics.settings import (
     ASK_AGAIN,
+    FEW_IMPACTS,
     ISLAND_COST,
+    LASTING_STEP,
+    MAX_IMPACTS,
     MAX_ISLAND_ROUNDS,
+    MAX_LASTING_ROUNDS,
     MAX_SUBSTEP_BISECTIONS,
     MAX_SUBSTEP_DISPLACEMENT,
     SEARCHES_PER_SORT,
@@ -111,8 +116,8 @@ class Solver:
         system, body = self._system, self._system.body
         body["resting"] = body["disturbed"] = body["time"] = 0
         place_kinematic(body, system.motion, now)
-        # Without gravity nothing rests, and nothing need be remembered of how near bodies are.
-        known = system.bounded if system.domain[0]["gravity"].any() else 0
+        # Where nothing can come to rest, nothing need be remembered of how near bodies are.
+        known = system.bounded if self._resting.known else 0
         seen = np.zeros(known, dtype=SEEN)
         for name in SEEN.names or ():
             seen[name] = body[name][:known]
@@ -132,7 +137,7 @@ class Solver:
             displacement=np.zeros(known),
             clearance=np.empty(0),
             forces=np.empty(0, dtype=FORCE),
-            pressed_speed=0.0,
+            lasting=np.zeros(system.particles if known else 0, dtype=np.int8),
         )
         forget_clearance(state, neighbours)
         return state
@@ -231,16 +236,19 @@ class Solver:
 
     # ---- the four verbs ----------------------------------------------------------------------------------------------
 
-    def _substep(self, duration: float, bisections: int = 0) -> None:
+    def _substep(self, duration: float, bisections: int = 0, again: int = 0) -> None:
         with self._spent_on("pairs"):
             self._find_pairs_for(duration)
-        if self._respond(duration, anyhow=bisections == MAX_SUBSTEP_BISECTIONS):
+        if self._respond(duration, anyhow=bisections >= MAX_SUBSTEP_BISECTIONS, again=again):
             with self._spent_on("advance"):
                 self._advance(duration)
+        elif self._resting.loses and duration <= LASTING_STEP and again < MAX_LASTING_ROUNDS:
+            # What met over and over is in lasting contact from the start.
+            self._substep(duration, bisections, again + 1)
         else:
             # Too much hangs together, or happens: less does in half the time.
-            self._substep(0.5 * duration, bisections + 1)
-            self._substep(0.5 * duration, bisections + 1)
+            self._substep(0.5 * duration, bisections + 1, again)
+            self._substep(0.5 * duration, bisections + 1, again)
 
     def _find_pairs_for(self, duration: float) -> None:
         """Search neighbours anew if any body may leave its skin within ``duration`` [s]."""
@@ -259,14 +267,19 @@ class Solver:
         state = self.state
         return predict(self._system, paths, state.neighbours, self._bound, state.standing, duration)
 
-    def _respond(self, duration: float, anyhow: bool) -> bool:
-        """Carry all that is struck through its impacts; False, with nothing changed, if it is too much."""
+    def _respond(self, duration: float, anyhow: bool, again: int) -> bool:
+        """Carry all that is struck through its impacts; False, with nothing else changed, if it is too much.
+
+        What had too many impacts is then in lasting contact, unless that was tried ``again`` and again.
+        """
         system, clock = self._system, self._clock
         paths = Paths(clock, no_segments())
         with self._spent_on("respond"):
             borne = self._resting.carry(self.state, duration)
         with self._spent_on("contacts"):
             predicted = self._find_contacts(paths, duration)
+        few = self._resting.loses and again < MAX_LASTING_ROUNDS
+        anyhow = anyhow and not few
         touched = [newly_touched(clock, predicted.pair, system.particles)]
         linked = predicted.pair
         rounds = unfinished = 0
@@ -276,20 +289,23 @@ class Solver:
                 rewind(paths, system.body, islands.member)
                 self._accumulator[islands.member[islands.start[:-1]]] = 0.0
                 first_segment = len(paths.segment)
-                paths, left = self._run(islands, paths, predicted, duration)
+                paths, left = self._run(islands, paths, predicted, duration, FEW_IMPACTS if few else MAX_IMPACTS)
                 unfinished += left
             with self._spent_on("contacts"):
                 linked = self._predict_across(paths, islands.member, first_segment, duration, again=rounds > 0)
                 touched.append(newly_touched(clock, linked, system.particles))
             rounds += 1
-        done = not len(linked) and (anyhow or not unfinished)
         disturbed = np.concatenate(touched)
+        done = not len(linked) and (anyhow or not unfinished)
         total = add_up(self._accumulator, clock, disturbed)
         if done:
             self._book(total, disturbed, borne, unfinished)
         else:
+            often = disturbed[clock["impacts"][disturbed] > FEW_IMPACTS]
             rewind(paths, system.body, disturbed)
             self._resting.release()
+            if few and duration <= LASTING_STEP:
+                self.state.lasting[often] = 1
             forget(clock, system.body, disturbed)
         self._disturbed = disturbed
         return done
@@ -303,7 +319,11 @@ class Solver:
             system.particles,
         )
         place_kinematic(system.body[system.particles :], system.motion, state.time)
-        times.append(time_within_skins(system, state.neighbours.reference, system.particles, system.bounded))
+        first = system.particles
+        if self._resting.carried:
+            self._resting.finish()
+            first = 0
+        times.append(time_within_skins(system, state.neighbours.reference, first, system.bounded))
         state.time_within_skins = min(times)
         forget(self._clock, system.body, self._disturbed)
 
@@ -326,8 +346,8 @@ class Solver:
         neighbours, tested, candidates = find_neighbours(
             spheres, domain["period"], order, self.model.has_polyhedra, self._find_pairs
         )
-        if domain["gravity"].any():
-            # Resting contacts are gone through in this order.
+        if self._resting.known:
+            # Lasting contacts are gone through in this order.
             sort_neighbours(neighbours)
         self.counts.pairs_tested += int(tested)
         self.counts.candidate_pairs += candidates
@@ -341,14 +361,16 @@ class Solver:
 
     # ---- islands -----------------------------------------------------------------------------------------------------
 
-    def _run(self, islands: Islands, paths: Paths, predicted: Predicted, duration: float) -> tuple[Paths, int]:
-        """Carry islands through their impacts; the paths with theirs, and how many islands were left unfinished."""
+    def _run(
+        self, islands: Islands, paths: Paths, predicted: Predicted, duration: float, most: int
+    ) -> tuple[Paths, int]:
+        """Carry islands through their impacts, so many a member: the paths, and how many were left unfinished."""
         system, neighbours, count = self._system, self.state.neighbours, len(islands.start) - 1
         team = ThreadTeam(ISLAND_COST * count)
-        accumulator, friction = self._accumulator, self._friction
+        accumulator, limits = self._accumulator, (most, self._friction)
         parts = team.each(
             lambda _, first, last: run_islands(
-                system, paths.clock, neighbours, predicted, islands, duration, accumulator, (first, last, friction)
+                system, paths.clock, neighbours, predicted, islands, duration, accumulator, (first, last, *limits)
             ),
             count,
             4 * team.threads,
@@ -393,4 +415,6 @@ class Solver:
             sums.flat[: len(total[place])] += total[place]
         counts.work += float(total[WORK:].sum())
         counts.wall_impulse += borne.wall_impulse
+        counts.wall_shear += borne.wall_shear
+        counts.dissipated[DISSIPATION.index("rest")] += borne.lost
         counts.unresolved += unfinished > 0 or borne.unresolved

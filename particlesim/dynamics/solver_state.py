@@ -15,8 +15,9 @@ from particlesim.dynamics.neighbour_list import NeighbourList, Order
 # A pose that displacements are counted from.
 SEEN = record([("position", "f8", (3,)), ("orientation", "f8", (4,))])
 
-# The force of a contact point in the substep before: a number for the pair of bodies, the point's lever, and the force.
-FORCE = record([("contact", "i8"), ("lever", "f8", (3,)), ("force", "f8")])
+# The force of a contact point at the end of the step before: a number for the pair of bodies, where the point is from
+# the first of them [m], the force on the second [N], and the torque against rolling [N m].
+FORCE = record([("contact", "i8"), ("arm", "f8", (3,)), ("force", "f8", (3,)), ("torque", "f8", (3,))])
 
 
 @dataclass
@@ -50,7 +51,7 @@ class SolverState:
     displacement: np.ndarray  # (n,) how far surfaces have come [m], (0,) where nothing comes to rest
     clearance: np.ndarray  # beside ``neighbours.other``: how far apart they were, plus displacements [m]
     forces: np.ndarray  # (k,) FORCE
-    pressed_speed: float  # the largest of surfaces of what rests [m/s]
+    lasting: np.ndarray  # (n,) int8, whether a particle was in lasting contact, (0,) where none comes to be
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Everything by name; what is not an array as one of no dimensions."""

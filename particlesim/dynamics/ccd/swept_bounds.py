@@ -121,7 +121,7 @@ def cull_pairs(system, neighbours, bound, standing, alike, duration, first, last
     """Neighbours of places ``first .. last`` that collide, or may, in ``duration`` [s], (m,) CANDIDATE.
 
     Where not all bodies are known to be spheres that accelerate ``alike``, it is looked at for each pair. What settles
-    together (see active_set.py) is left out, and so are pairs without a particle.
+    together (see lasting_contacts.py) is left out, and so are pairs without a particle.
     """
     system, neighbours, bound, standing, alike = without_refcounts((system, neighbours, bound, standing, alike))
     period = system.domain[0].period

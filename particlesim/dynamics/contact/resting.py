@@ -1,179 +1,210 @@
-"""Resting contacts: what gravity presses together does not fall, sink or tremble.
+"""Lasting contacts: what is pressed together, or meets over and over, does not fall, sink or tremble.
 
 A ball that bounces with restitution below 1 makes infinitely many bounces in a finite time. They end here: what hardly
-moves against an obstacle that gravity presses it against, and all that is near it (see active_set.py), is taken
-together for a whole substep (see projected_solver.py).
+moves against an obstacle that gravity presses it against, what had too many impacts in a step, and all that is near
+it, is taken together for a whole step (see island_step.py).
 """
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.dynamics.contact.active_set import add_displacements, expected_speeds, find_active_set, surface_speeds
-from particlesim.dynamics.contact.contact_points import Motion, handed_down
-from particlesim.dynamics.contact.end_of_step_correction import place_ahead, sunk_points
-from particlesim.dynamics.contact.projected_solver import settle
+from particlesim.core.parallel import ThreadTeam
+from particlesim.dynamics.contact.clearance import add_displacements, expected_speeds, surface_speeds
+from particlesim.dynamics.contact.cone_solver import MOVER
+from particlesim.dynamics.contact.island_step import (
+    Islands,
+    finish,
+    step_islands,
+    take_over,
+    write_obstacles,
+)
+from particlesim.dynamics.contact.lasting_contacts import Motion, Search, contacts_of, resting_on_obstacles
+from particlesim.dynamics.contact.lasting_islands import forces_after, gathered, warm_start
+from particlesim.dynamics.contact.position_correction import place_obstacles_ahead
 from particlesim.dynamics.neighbour_list import NeighbourList
 from particlesim.dynamics.settings import (
-    MAX_ACTIVE_SET_SEARCHES,
-    MAX_CORRECTIONS,
-    RESTING_DISPLACEMENT,
-    RESTITUTION_THRESHOLD_HEIGHT,
-    SHORTEST_RESTING_SUBSTEP,
+    LASTING_STEP,
+    MAX_CONTACT_SEARCHES,
+    PAIR_COST,
     SPEED_GAIN,
     SPEED_MARGIN,
+    UNRESOLVED_VELOCITY,
 )
-from particlesim.dynamics.solver_state import FORCE, SolverState
+from particlesim.dynamics.solver_state import SolverState
+from particlesim.dynamics.standing import LOOSE, SETTLES
 from particlesim.model.bodies import angular_velocities
 from particlesim.model.system import System
 
 
-class ClearanceMemory(NamedTuple):
-    """What is remembered of how near bodies are (see find_active_set)."""
-
-    standing: np.ndarray  # (n,) int64
-    displacement: np.ndarray  # (n,) [m]
-    clearance: np.ndarray  # beside ``neighbours.other`` [m]
-
-
-class _Settled(NamedTuple):
-    """Contact points and what goes through them in a substep."""
-
-    point: np.ndarray  # (m,) CONTACT_POINT
-    impulse: np.ndarray  # (m,) [N s]
-    steady: np.ndarray  # (m,) without what makes points part again [N s]
-    spin: np.ndarray  # (n, 3) angular velocities with these impulses [rad/s]
-    done: bool  # whether the impulses are good enough
-
-
 class Borne(NamedTuple):
-    """What resting contacts bore in a substep."""
+    """What lasting contacts bore in a step."""
 
     wall_impulse: np.ndarray  # (6,) [N s]
+    wall_shear: np.ndarray  # (6, 3) [N s]
     virial: float  # [J s]
+    lost: float  # energy [J]
     unresolved: bool  # whether the bound on the work was reached
 
 
-NOTHING_BORNE = Borne(np.zeros(6), 0.0, False)
+NOTHING_BORNE = Borne(np.zeros(6), np.zeros((6, 3)), 0.0, 0.0, False)
 
 
 class RestingContacts:
-    """Carries what rests, one substep after the other, changing the records of the bodies and a ``state`` in place."""
+    """Carries what is in lasting contact, changing the records of the bodies and a ``state`` in place."""
 
     def __init__(self, system: System) -> None:
         self._system = system
-        particles = system.body[: system.particles]
         self._gravity = float(np.linalg.norm(system.domain[0]["gravity"]))
-        self._inradius = float(particles["inradius"].mean()) if len(particles) else 0.0
-        self._last_bounces = self._time_of_last_bounces()
-        self._ahead = system.body.copy() if self._gravity else system.body[:0]
-        self._before = particles[:0]
-
-    def _time_of_last_bounces(self) -> float:
-        """What bounces to rest has done so after this time [s], in which it must be looked at; inf if nothing does."""
-        lossless = self._system.law["restitution"].min(initial=1.0) == 1.0
-        if self._gravity == 0.0 or lossless or not self._system.particles:
-            return np.inf
-        height = RESTITUTION_THRESHOLD_HEIGHT * self._inradius
-        return 0.5 * float(np.sqrt(2.0 * height / self._gravity))
-
-    @property
-    def _resting(self) -> np.ndarray:
-        """Which particles rest, (k,)."""
-        return np.flatnonzero(self._system.body["resting"][: self._system.particles])
+        self.loses = bool(system.law["restitution"].min(initial=1.0) < 1.0)
+        self.known = self._gravity > 0.0 or self.loses
+        self._mover = np.zeros(len(system.body) if self.known else 0, dtype=MOVER)
+        self._ahead = np.zeros_like(self._system.body[: len(self._mover)])  # scratch: at the end of the step
+        self._member = np.empty(0, dtype=np.int64)
+        self._before = system.body[:0]
 
     def longest_substep(self, state: SolverState) -> float:
-        """How long a substep may be [s]: not so long that what came to rest were not looked at."""
-        if self._gravity == 0.0 or not len(self._resting):
-            return self._last_bounces
-        in_time = RESTING_DISPLACEMENT * self._inradius / max(state.pressed_speed, 1e-300)
-        return min(max(in_time, SHORTEST_RESTING_SUBSTEP * self._last_bounces), self._last_bounces)
+        """How long a substep may be [s] with what is in lasting contact, or soon may be."""
+        return LASTING_STEP if self.loses and (self._gravity > 0.0 or state.lasting.any()) else np.inf
 
     def carry(self, state: SolverState, duration: float) -> Borne:
-        """Carry what rests through a substep of ``duration`` [s]: its velocity changes and it does not fall."""
-        if self._gravity == 0.0:
+        """Carry what is in lasting contact through a substep of ``duration`` [s]: its velocity changes."""
+        self._member = self._member[:0]
+        state.standing[:] = 0
+        if not self.known:
             return NOTHING_BORNE
         system, body, neighbours = self._system, self._system.body, state.neighbours
-        self._let_fall(self._resting)
-        add_displacements(system, state.seen, state.displacement)
-        memory = ClearanceMemory(state.standing, state.displacement, state.clearance)
+        body["resting"][: system.particles] = 0
         spin = angular_velocities(body, len(body))
         gain = SPEED_GAIN * self._gravity * duration
         speed = expected_speeds(surface_speeds(body, spin, system.bounded), neighbours, gain)
-        before = body[["velocity", "angular_momentum"]].copy()
-        for search in range(1, MAX_ACTIVE_SET_SEARCHES + 1):
+        seeds = self._seeds(state, Motion(spin, speed, duration))
+        if not len(seeds):
+            return NOTHING_BORNE
+        add_displacements(system, state.seen, state.displacement)
+        write_obstacles(body, self._mover, system.particles)
+        place_obstacles_ahead(system, duration, self._ahead)
+        for search in range(1, MAX_CONTACT_SEARCHES + 1):
             motion = Motion(spin, speed, duration)
-            point = find_active_set(system, neighbours, motion, memory)
-            if not len(point):
-                return NOTHING_BORNE
-            settled = self._settle(state, point, motion, before)
-            reached = surface_speeds(body, settled.spin, system.bounded)
-            state.pressed_speed = float(reached[self._resting].max(initial=0.0))
-            state.forces = self._forces_after(settled, duration)
+            points, terms, loose = self._contacts(state, motion, seeds)
+            islands = gathered(points, terms, seeds, system.particles)
+            warm_start(islands, state.forces, len(body))
+            left = self._step(islands, duration)
+            reached = surface_speeds(body, angular_velocities(body, len(body)), system.bounded)
             foreseen = bool((reached <= SPEED_MARGIN * speed).all())
-            if foreseen or search == MAX_ACTIVE_SET_SEARCHES:
-                return self._borne(settled, foreseen)
+            if foreseen or search == MAX_CONTACT_SEARCHES:
+                break
             np.maximum(speed, SPEED_MARGIN * reached, out=speed)
             self.release()
-        raise AssertionError("the last search returns")
+        state.standing[islands.member] = np.where(loose[islands.member] > 0, LOOSE, SETTLES)
+        state.forces = forces_after(islands, len(body))
+        self._mark_lasting(state, islands)
+        scale = max(self._gravity * duration, 1e-300)
+        return self._borne(islands, not foreseen or left > UNRESOLVED_VELOCITY * scale)
 
-    def _borne(self, settled: _Settled, foreseen: bool) -> Borne:
-        """What the contacts bore."""
-        b = settled.point["b"]
-        wall, on_particle = self._system.body["wall"][b], b < self._system.particles
-        walls = np.bincount(wall[wall >= 0], settled.impulse[wall >= 0], minlength=6)
-        virial = float((settled.impulse * settled.point["distance"])[on_particle].sum())
-        return Borne(walls, virial, not (settled.done and foreseen))
+    def _seeds(self, state: SolverState, motion: Motion) -> np.ndarray:
+        """Particles that are in lasting contact to begin with, (k,)."""
+        system = self._system
+        rests = state.lasting.astype(np.bool_)
+        if self._gravity > 0.0:
+            ThreadTeam(system.particles).each(
+                lambda _, first, last: resting_on_obstacles(system, state.neighbours, motion, rests, first, last),
+                system.particles,
+            )
+        return np.flatnonzero(rests)
 
-    def _settle(self, state: SolverState, point: np.ndarray, motion: Motion, before: np.ndarray) -> _Settled:
-        """Let bodies settle, and anew with more contact points where they would have sunk in at the end."""
-        system, duration = self._system, motion.duration
-        impulse = self._forces_before(state, point) * duration
-        for correction in range(1, MAX_CORRECTIONS + 1):
-            done, steady = settle(system, motion.spin, point, duration, impulse)
-            self._before = before[: system.particles][self._resting]
-            spin = angular_velocities(system.body, len(system.body))
-            place_ahead(system, state.standing, duration, self._ahead)
-            velocity = np.ascontiguousarray(before["velocity"])
-            more, place = sunk_points(system, self._ahead, (velocity, motion.spin, spin), point, duration)
-            if not len(more) or correction == MAX_CORRECTIONS:
-                return _Settled(point, impulse, steady, spin, bool(done) and not len(more))
-            point, impulse = np.insert(point, place, more), np.insert(steady, place, 0.0)
-            self.release()
-        raise AssertionError("the last correction returns")
+    def _contacts(
+        self, state: SolverState, motion: Motion, seeds: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Contact points of all that may come to touch the seeds, their terms, and which bodies are loose (n,)."""
+        system, count = self._system, len(self._system.body)
+        search = Search(
+            np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64), state.displacement, state.clearance
+        )
+        parts: list[tuple[np.ndarray, np.ndarray]] = []
+        indices, number = seeds, 0
+        while len(indices):
+            search.round[indices] = number
+            team = ThreadTeam(PAIR_COST * len(indices))
+            found = team.each(partial(self._contacts_in_round, state.neighbours, motion, search, indices), len(indices))
+            parts += found
+            ends = np.concatenate([part[0][end] for part in found for end in ("a", "b")])
+            ends = ends[ends < system.particles]
+            indices = np.unique(ends[search.round[ends] < 0]).astype(np.int64)
+            number += 1
+        return np.concatenate([p for p, _ in parts]), np.concatenate([t for _, t in parts]), search.loose
 
-    def _let_fall(self, indices: np.ndarray) -> None:
-        """Let gravity act on particles again."""
-        self._system.body["resting"][indices] = 0
+    def _contacts_in_round(
+        self,
+        neighbours: NeighbourList,
+        motion: Motion,
+        search: Search,
+        indices: np.ndarray,
+        _: int,
+        first: int,
+        last: int,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        return contacts_of(self._system, neighbours, motion, search, indices, first, last)
+
+    def _step(self, islands: Islands, duration: float) -> float:
+        """Take islands through a step; the largest velocity that their last sweeps changed anything by [m/s]."""
+        system = self._system
+        team = ThreadTeam(PAIR_COST * len(islands.points))
+        left = team.each(
+            lambda _, first, last: step_islands(system, islands, self._mover, duration, self._ahead, first, last),
+            len(islands.first_point) - 1,
+            4 * team.threads,
+        )
+        self._member = islands.member
+        self._before = system.body[["velocity", "angular_momentum"]][islands.member]
+        take_over(system.body, islands.member, self._ahead)
+        return max(left)
+
+    def finish(self) -> None:
+        """Put what was carried where it is at the end of the substep, after it has gone on at its velocity."""
+        if len(self._member):
+            finish(self._system, self._member, self._ahead)
+
+    @property
+    def carried(self) -> bool:
+        """Whether anything was."""
+        return len(self._member) > 0
 
     def release(self) -> None:
         """Undo what the last ``carry`` did to the bodies."""
-        indices = self._resting
-        if len(indices):
-            for name in ("velocity", "angular_momentum"):
-                self._system.body[name][indices] = self._before[name]
-            self._let_fall(indices)
+        if not self.carried:
+            return
+        for name in ("velocity", "angular_momentum"):
+            self._system.body[name][self._member] = self._before[name]
+        self._system.body["resting"][self._member] = 0
+        self._member = self._member[:0]
 
-    def _contact_of(self, point: np.ndarray) -> np.ndarray:
-        """A number for the pair of bodies at each contact point."""
-        return point["a"] * len(self._system.body) + point["b"]
+    def _mark_lasting(self, state: SolverState, islands: Islands) -> None:
+        """Particles that were pushed by what does not rebound in full are in lasting contact."""
+        pushed = (islands.terms["pushed"] > 0.0) & (islands.terms["restitution"] < 1.0)
+        state.lasting[:] = 0
+        for end in ("a", "b"):
+            indices = islands.points[end][pushed]
+            state.lasting[indices[indices < self._system.particles]] = 1
 
-    def _forces_before(self, state: SolverState, point: np.ndarray) -> np.ndarray:
-        """The forces [N] that these contact points had in the substep before; 0 for new ones."""
-        contact, known = self._contact_of(point), state.forces["contact"]
-        order = np.argsort(contact, kind="stable")
-        first = np.searchsorted(contact, known, sorter=order)
-        last = np.searchsorted(contact, known, side="right", sorter=order)
-        return handed_down(point, order, first, last, state.forces)
-
-    def _forces_after(self, settled: _Settled, duration: float) -> np.ndarray:
-        """The forces of contact points for the substep after, (m,) FORCE."""
-        forces = np.empty(len(settled.point), dtype=FORCE)
-        forces["contact"], forces["lever"] = self._contact_of(settled.point), settled.point["lever_a"]
-        forces["force"] = settled.steady / duration
-        return forces
+    def _borne(self, islands: Islands, unresolved: bool) -> Borne:
+        """What the contacts bore."""
+        points, impulse = islands.points, islands.terms["impulse"]
+        along = (points["normal"] * impulse).sum(axis=1)
+        wall = self._system.body["wall"][points["b"]]
+        on_wall, on_particle = wall >= 0, points["b"] < self._system.particles
+        shear = np.zeros((6, 3))
+        np.add.at(shear, wall[on_wall], (impulse - along[:, None] * points["normal"])[on_wall])
+        return Borne(
+            np.bincount(wall[on_wall], along[on_wall], minlength=6),
+            shear,
+            float(((points["arm_a"] - points["arm_b"]) * impulse)[on_particle].sum()),
+            float(islands.lost.sum()),
+            unresolved,
+        )
 
 
 def forget_clearance(state: SolverState, neighbours: NeighbourList) -> None:

@@ -15,7 +15,7 @@ from particlesim.dynamics.contact.booking import WALLS
 from particlesim.dynamics.contact.impact import MAX_CONTACTS, NOTHING, STRUCK, new_moment, resolve_contacts
 from particlesim.dynamics.contact.sphere_pair import resolve_sphere_pair, strike_alone
 from particlesim.dynamics.events.paths import SEGMENT, UNCHAINED, UNDISTURBED, write_segment
-from particlesim.dynamics.settings import MAX_IMPACTS, MAX_SLOW_IMPACTS, SIMULTANEOUS
+from particlesim.dynamics.settings import MAX_SLOW_IMPACTS, SIMULTANEOUS
 from particlesim.geometry.narrow_phase.gjk import NO_SIMPLEX
 from particlesim.geometry.support import half_space_plane
 from particlesim.model.bodies import KINEMATIC, placed
@@ -274,14 +274,16 @@ def _resolve_moment(system, clock, found, moment, budget, interval, accumulator,
 
 
 @kernel
-def _run_island(system, clock, neighbours, members, duration, queue, moment, segments):
+def _run_island(system, clock, neighbours, members, bounds, queue, moment, segments):
     """Carry an island whose first events are on the queue through its impacts.
 
+    ``bounds`` are the end of the substep [s], and how many moments of impact there may be for each of the members.
     ``segments`` are (room for them, how many there are, the accumulator). Returns the room, how many there are then,
     and whether impacts were left.
     """
     segment, used, accumulator = segments
-    left, budget = MAX_IMPACTS * len(members), MAX_SLOW_IMPACTS * len(members)
+    duration, most = bounds
+    left, budget = most * len(members), MAX_SLOW_IMPACTS * len(members)
     time = 0.0
     while left > 0:
         time, count, size = _pop_simultaneous(system, clock, queue, SIMULTANEOUS * duration, moment)
@@ -306,8 +308,9 @@ def _run_island(system, clock, neighbours, members, duration, queue, moment, seg
 
 @entry_kernel
 def run_islands(system, clock, neighbours, predicted, islands, duration, accumulator, block):
-    """Carry out the impacts of the islands of a block (first, last, contact laws if there is friction) in ``duration``.
+    """Carry out the impacts of islands within ``duration`` [s].
 
+    A ``block`` is (first and last island, moments of impact a member at most, contact laws if there is friction);
     ``predicted`` are the impacts on the paths of the start. Adds to the row of ``accumulator`` (n, columns as in
     booking.py) of each island's first member. Returns the path segments, and how many islands were left with impacts to
     resolve.
@@ -315,7 +318,7 @@ def run_islands(system, clock, neighbours, predicted, islands, duration, accumul
     system, clock, neighbours, predicted, islands, accumulator = without_refcounts(
         (system, clock, neighbours, predicted, islands, accumulator)
     )
-    moment = new_moment(block[2])
+    moment = new_moment(block[3])
     segment = np.empty(256, dtype=SEGMENT)
     used = unfinished = 0
     queue = [(0.0, 0, 0, 0)]
@@ -331,8 +334,7 @@ def run_islands(system, clock, neighbours, predicted, islands, duration, accumul
                 used += 4
                 continue
         _begin(predicted, clock, members, queue)
-        segment, used, left = _run_island(
-            system, clock, neighbours, members, duration, queue, moment, (segment, used, accumulator[members[0]])
-        )
+        segments, bounds = (segment, used, accumulator[members[0]]), (duration, block[2])
+        segment, used, left = _run_island(system, clock, neighbours, members, bounds, queue, moment, segments)
         unfinished += left
     return segment[:used], unfinished

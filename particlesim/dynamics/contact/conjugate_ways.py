@@ -1,0 +1,85 @@
+"""Conjugate ways: sweeps over contact points that go on along the way of those before.
+
+What a sweep changes is the way down in a problem that is quadratic but for the cones: going on along ways that are
+conjugate, as long as they get shorter, takes far fewer of them (M. Silcowitz-Hansen, S. Niebuhr, K. Erleben, The Visual
+Computer 26 (2010) 893-901).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from particlesim.core.jit import kernel
+
+
+class Ways(NamedTuple):
+    """Impulses and velocities at the start of a sweep, and the ways that they have taken."""
+
+    impulse: np.ndarray  # (m, 7): push, drag and roll
+    of_impulse: np.ndarray  # (m, 7)
+    motion: np.ndarray  # (n, 6): velocity and angular velocity
+    of_motion: np.ndarray  # (n, 6)
+
+
+@kernel
+def new_ways(points, members):
+    """Room for so many contact points and members."""
+    return Ways(np.zeros((points, 7)), np.zeros((points, 7)), np.zeros((members, 6)), np.zeros((members, 6)))
+
+
+@kernel
+def set_out(points, terms, mover, span, members, ways):
+    """Keep what a sweep starts from."""
+    for k in range(span[0], span[1]):
+        p, t, row = points[k], terms[k], ways.impulse[k - span[0]]
+        row[0] = p.push
+        for axis in range(3):
+            row[1 + axis], row[4 + axis] = p.drag[axis], t.roll[axis]
+    for i in members:
+        m = mover[i]
+        for axis in range(3):
+            ways.motion[m.row, axis], ways.motion[m.row, 3 + axis] = m.velocity[axis], m.spin[axis]
+
+
+@kernel
+def length2_of(points, terms, span, ways):
+    """The square of what a sweep has changed, as twice a kinetic energy [J]."""
+    length2 = 0.0
+    for k in range(span[0], span[1]):
+        p, t, row = points[k], terms[k], ways.impulse[k - span[0]]
+        length2 += (p.push - row[0]) ** 2 / p.normal_mass
+        if p.static_friction > 0.0:
+            for axis in range(3):
+                length2 += (p.drag[axis] - row[1 + axis]) ** 2 / p.tangential_mass
+        if t.rolling_friction > 0.0:
+            for axis in range(3):
+                length2 += (t.roll[axis] - row[4 + axis]) ** 2 / t.rolling_mass
+    return length2
+
+
+@kernel
+def go_on(points, terms, mover, span, members, ways, share):
+    """Go a share of the last way once more; the way of these sweeps becomes all that was gone."""
+    for k in range(span[0], span[1]):
+        p, t, row, way = points[k], terms[k], ways.impulse[k - span[0]], ways.of_impulse[k - span[0]]
+        on = share * way[0]
+        way[0] = p.push - row[0] + on
+        p.push += on
+        for axis in range(3):
+            on = share * way[1 + axis]
+            way[1 + axis] = p.drag[axis] - row[1 + axis] + on
+            p.drag[axis] += on
+            on = share * way[4 + axis]
+            way[4 + axis] = t.roll[axis] - row[4 + axis] + on
+            t.roll[axis] += on
+    for i in members:
+        m = mover[i]
+        for axis in range(3):
+            on = share * ways.of_motion[m.row, axis]
+            ways.of_motion[m.row, axis] = m.velocity[axis] - ways.motion[m.row, axis] + on
+            m.velocity[axis] += on
+            on = share * ways.of_motion[m.row, 3 + axis]
+            ways.of_motion[m.row, 3 + axis] = m.spin[axis] - ways.motion[m.row, 3 + axis] + on
+            m.spin[axis] += on

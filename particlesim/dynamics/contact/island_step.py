@@ -1,0 +1,304 @@
+"""One step of an island: bodies in lasting contact move on together, by Moreau's time stepping.
+
+The step is taken in a few substeps in which contacts and their levers stay as they are and gaps change linearly. In
+each, gravity acts, and impulses leave no gap closing by more than there is of it (gaps as in M. Anitescu, F. A. Potra,
+Nonlinear Dynamics 14 (1997) 231-247). Points that met fast then part as their restitution says.
+
+Displacements are those of the mean of old and new velocities, as far as that closes no gap, so that what slides under a
+constant force is where it should be; what was struck has moved at its new velocity.
+
+Energy never rises: the new motion differs from the free one, which keeps it, by what the impulses did, and should these
+gain any, all of them are made smaller until they do not.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
+from particlesim.core.math3d import (
+    add,
+    axpy,
+    norm,
+    scale,
+    set_quat,
+    set_vec3,
+    sub,
+    to_quat,
+)
+from particlesim.core.math3d import to_vec3 as vec
+from particlesim.dynamics.contact.cone_solver import Sweeps, briefly, give, give_turn, solve
+from particlesim.dynamics.contact.conjugate_ways import new_ways
+from particlesim.dynamics.contact.contact_records import along_normal
+from particlesim.dynamics.contact.island_energy import (
+    add_affordable,
+    affordable,
+    free_state,
+    gain_ahead,
+    pay,
+    place_ahead,
+    rounding_of_energy,
+    write_state,
+)
+from particlesim.dynamics.contact.movers import change_of, closing, gap_now, write_mover
+from particlesim.dynamics.contact.position_correction import correct_positions
+from particlesim.dynamics.settings import (
+    CONJUGATE_SWEEPS,
+    FEW_SWEEPS,
+    GAP_ROUNDING,
+    MAX_SWEEPS,
+    MEAN_VELOCITY_ROUNDS,
+    NEAR_SWEEP_CONVERGED,
+    RESTING_SUBSTEPS,
+    SWEEP_CONVERGED,
+    SWEEP_VISITS,
+)
+from particlesim.model.domain import nearest_image
+
+_STILL = (0.0, 0.0, 0.0)
+
+
+class Islands(NamedTuple):
+    """Contact points and bodies of islands: those of island k are ``point[first_point[k]:first_point[k + 1]]``."""
+
+    first_point: np.ndarray  # (k + 1,) int64
+    points: np.ndarray  # (m,) CONTACT_POINT
+    terms: np.ndarray  # (m,) CONTACT_TERMS
+    first_member: np.ndarray  # (k + 1,) int64
+    member: np.ndarray  # (n,) int64, particles
+    lost: np.ndarray  # (k,) energy that the islands lose in the step [J]
+
+
+# ---- substeps ------------------------------------------------------------------------------------------------------
+
+
+@kernel
+def _begin(islands, span, duration):
+    """Let contact points have the impulses of a substep as in the step before."""
+    for k in range(span[0], span[1]):
+        p, t = islands.points[k], islands.terms[k]
+        along, across = along_normal(p, vec(t.force))
+        p.push = max(along, 0.0) * duration
+        set_vec3(p.drag, scale(across, duration if p.static_friction > 0.0 and p.push > 0.0 else 0.0))
+        set_vec3(t.roll, scale(vec(t.torque), duration if t.rolling_friction > 0.0 else 0.0))
+
+
+@kernel
+def _substep(islands, mover, span, members, fall, interval, sweeps, ways):
+    """Take an island through the substep of an interval (time, duration); returns the last change of a velocity."""
+    points, terms = islands.points, islands.terms
+    time, duration = interval
+    parts = False
+    for i in members:
+        set_vec3(mover[i].velocity, add(vec(mover[i].velocity), fall))
+    for k in range(span[0], span[1]):
+        p, t = points[k], terms[k]
+        a, b = mover[p.a], mover[p.b]
+        gap, bent = gap_now(p, t, a, b, time)
+        # It bends as the square of the time: so much more than until now in this substep.
+        bends = -bent * (2.0 * time / duration + 1.0) * duration * duration / (time * time) if bent < 0.0 else 0.0
+        room = gap - bends
+        p.wanted, t.parting = -max(room - t.slack, 0.0) / duration, min(max(-room, 0.0), bends) / duration
+        parts = parts or t.parting > 0.0
+        give(p, a, b, axpy(vec(p.drag), vec(p.normal), p.push))
+        if t.rolling_friction > 0.0:
+            give_turn(a, b, vec(t.roll))
+    left = solve(points, terms, mover, span, members, sweeps, ways)
+    if parts:
+        for k in range(span[0], span[1]):
+            points[k].wanted += terms[k].parting
+        # They may have no room to: impulses would grow for as long as they are looked for.
+        solve(points, terms, mover, span, members, briefly(sweeps), ways)
+    for i in members:
+        m = mover[i]
+        set_vec3(m.shift, axpy(vec(m.shift), vec(m.velocity), duration))
+        set_vec3(m.turn, axpy(vec(m.turn), vec(m.spin), duration))
+    for k in range(span[0], span[1]):
+        p, t = points[k], terms[k]
+        t.pushed += p.push
+        set_vec3(t.impulse, add(vec(t.impulse), axpy(vec(p.drag), vec(p.normal), p.push)))
+        set_vec3(t.angular_impulse, add(vec(t.angular_impulse), vec(t.roll)))
+    return left
+
+
+@kernel
+def _remember(islands, span, duration):
+    """Keep the forces at the end of the step for the next."""
+    for k in range(span[0], span[1]):
+        p, t = islands.points[k], islands.terms[k]
+        set_vec3(t.force, scale(axpy(vec(p.drag), vec(p.normal), p.push), 1.0 / duration))
+        set_vec3(t.torque, scale(vec(t.roll), 1.0 / duration))
+
+
+@kernel
+def _rebound(islands, mover, span, members, sweeps, ways):
+    """Let points that met fast part as their restitution says; returns whether there are any."""
+    anything = False
+    for k in range(span[0], span[1]):
+        p, t = islands.points[k], islands.terms[k]
+        if t.pushed > 0.0 and t.approach < -t.threshold and t.restitution > 0.0:
+            p.wanted = -t.restitution * t.approach
+            anything = True
+    if anything:
+        solve(islands.points, islands.terms, mover, span, members, briefly(sweeps), ways)
+    return anything
+
+
+@kernel
+def _add_rebound(islands, span, duration, share):
+    """Add a share of the impulses since ``_remember`` to those of the step."""
+    for k in range(span[0], span[1]):
+        p, t = islands.points[k], islands.terms[k]
+        back = axpy(axpy(vec(p.drag), vec(p.normal), p.push), vec(t.force), -duration)
+        set_vec3(t.impulse, axpy(vec(t.impulse), back, share))
+        back = axpy(vec(t.roll), vec(t.torque), -duration)
+        set_vec3(t.angular_impulse, axpy(vec(t.angular_impulse), back, share))
+
+
+# ---- displacements -------------------------------------------------------------------------------------------------
+
+
+@kernel
+def _mean_velocities(islands, mover, span, members, time, duration):
+    """Take half of what became faster in the step, for a substep, back from displacements, where that closes no gap.
+
+    Sums of new velocities of substeps become sums of the means of old and new ones.
+    """
+    struck = np.zeros(len(members), dtype=np.bool_)
+    for _ in range(MEAN_VELOCITY_ROUNDS):
+        more = False
+        for k in range(span[0], span[1]):
+            p, t = islands.points[k], islands.terms[k]
+            a, b = mover[p.a], mover[p.b]
+            fixed_a, fixed_b = struck[a.row], b.row < 0 or struck[b.row]
+            if fixed_a and fixed_b:
+                continue
+            of_a = (_STILL, _STILL) if fixed_a else change_of(a)
+            of_b = (_STILL, _STILL) if fixed_b else change_of(b)
+            gap, _ = gap_now(p, t, a, b, time)
+            if gap - 0.5 * duration * closing(p, of_a, of_b) < min(gap, 0.0) - GAP_ROUNDING * t.inradius:
+                struck[a.row] = more = True
+                if b.row >= 0:
+                    struck[b.row] = True
+        if not more:
+            break
+    else:
+        struck[:] = True
+    for k in range(len(members)):
+        m = mover[members[k]]
+        if not struck[k]:
+            faster, turning = change_of(m)
+            set_vec3(m.shift, axpy(vec(m.shift), faster, -0.5 * duration))
+            set_vec3(m.turn, axpy(vec(m.turn), turning, -0.5 * duration))
+
+
+# ---- a step --------------------------------------------------------------------------------------------------------
+
+
+@kernel
+def _scale_impulses(islands, span, share):
+    """Let contact points have had a share of their impulses."""
+    for k in range(span[0], span[1]):
+        t = islands.terms[k]
+        set_vec3(t.impulse, scale(vec(t.impulse), share))
+        set_vec3(t.angular_impulse, scale(vec(t.angular_impulse), share))
+
+
+@kernel
+def _limits(islands, span, fall, part):
+    """How many sweeps the points of a span have in a ``part`` of the step [s], and when they end."""
+    fastest, visits = norm(fall), 2 * RESTING_SUBSTEPS * max(span[1] - span[0], 1)
+    least = np.inf
+    for k in range(span[0], span[1]):
+        fastest = max(fastest, abs(islands.terms[k].approach))
+        least = min(least, islands.terms[k].inradius)
+    few = SWEEP_VISITS // visits
+    if few > FEW_SWEEPS:
+        return Sweeps(min(few, MAX_SWEEPS), SWEEP_CONVERGED * fastest, True)
+    return Sweeps(CONJUGATE_SWEEPS, max(SWEEP_CONVERGED * fastest, NEAR_SWEEP_CONVERGED * least / part), False)
+
+
+@kernel
+def _step_island(system, islands, mover, k, duration, ahead):
+    """Take island ``k`` through a step of ``duration`` [s]; returns as ``step_islands`` does."""
+    span = islands.first_point[k], islands.first_point[k + 1]
+    members = islands.member[islands.first_member[k] : islands.first_member[k + 1]]
+    gravity, part = vec(system.domain[0].gravity), duration / RESTING_SUBSTEPS
+    for m in range(len(members)):
+        write_mover(mover[members[m]], system.body[members[m]], m)
+    fall = scale(gravity, part)
+    sweeps = _limits(islands, span, fall, part)
+    ways = new_ways(span[1] - span[0], len(members))
+    _begin(islands, span, part)
+    left = 0.0
+    for substep in range(RESTING_SUBSTEPS):
+        left = _substep(islands, mover, span, members, fall, (substep * part, part), sweeps, ways)
+    _remember(islands, span, part)
+    _mean_velocities(islands, mover, span, members, duration, part)
+    states = np.empty((len(members), 12)), np.empty((len(members), 12)), np.empty((len(members), 12))
+    rounding = rounding_of_energy(system, mover, members, gravity)
+    free_state(mover, members, gravity, duration, states[0])
+    write_state(islands, mover, span, members, states[1])
+    share = affordable(system, members, gravity, duration, states, rounding)
+    if share < 1.0:
+        _scale_impulses(islands, span, share)
+    place_ahead(system, members, gravity, duration, states[2], ahead)
+    held = correct_positions(system, islands, mover, span, ahead, len(members))
+    gain = gain_ahead(system, members, gravity, ahead)
+    if gain > rounding:
+        pay(members, ahead, gain)
+    write_state(islands, mover, span, members, states[0])
+    if _rebound(islands, mover, span, members, sweeps, ways):
+        _add_rebound(islands, span, part, 1.0)
+        write_state(islands, mover, span, members, states[1])
+        share = add_affordable(system, members, gravity, states[1] - states[0], ahead)
+        _add_rebound(islands, span, part, share - 1.0)
+    islands.lost[k] = -gain_ahead(system, members, gravity, ahead)
+    return np.inf if held else left
+
+
+@entry_kernel
+def step_islands(system, islands, mover, duration, ahead, first, last):
+    """Take islands ``first .. last`` through a step of ``duration`` [s].
+
+    Writes where bodies are in the end, and how they move, into ``ahead`` (n,) BODY, and the impulses. Returns the
+    largest velocity that was still changing [m/s], infinity if some bodies were held back.
+    """
+    system, islands, mover, ahead = without_refcounts((system, islands, mover, ahead))
+    left = 0.0
+    for k in range(first, last):
+        left = max(left, _step_island(system, islands, mover, k, duration, ahead))
+    return left
+
+
+@entry_kernel
+def write_obstacles(body, mover, first):
+    """Write obstacles as the sweeps see them."""
+    body, mover = without_refcounts((body, mover))
+    for i in range(first, len(body)):
+        write_mover(mover[i], body[i], -1)
+
+
+@entry_kernel
+def take_over(body, member, ahead):
+    """Give particles the velocities and angular momenta that they go on with for the step: they do not fall."""
+    body, member, ahead = without_refcounts((body, member, ahead))
+    for i in member:
+        set_vec3(body[i].velocity, vec(ahead[i].velocity))
+        set_vec3(body[i].angular_momentum, vec(ahead[i].angular_momentum))
+        body[i].resting = 1
+
+
+@entry_kernel
+def finish(system, member, ahead):
+    """Put particles that have not been struck since where they are at the end of the step."""
+    system, member, ahead = without_refcounts((system, member, ahead))
+    for i in member:
+        b, then = system.body[i], ahead[i]
+        if b.resting != 0:
+            # They may have come back into a periodic domain.
+            shift = nearest_image(sub(vec(then.position), vec(b.position)), system.domain[0].period)
+            set_vec3(b.position, add(vec(b.position), shift))
+            set_quat(b.orientation, to_quat(then.orientation))

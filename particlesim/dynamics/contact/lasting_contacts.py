@@ -1,0 +1,351 @@
+"""Lasting contacts: the points where bodies touch or may come to touch within a step, and what is known of each.
+
+Between two bodies every corner of the manifold that may close within the step is a contact point, with the gap that is
+left there. A manifold is what is nearly level; the nearest points of two polyhedra are among its corners always.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from particlesim.core.constants import MAX_MANIFOLD
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
+from particlesim.core.math3d import (
+    add,
+    cross,
+    dot,
+    grow_records,
+    inverse_rotate,
+    load_vec3,
+    norm,
+    rotate,
+    scale,
+    set_vec3,
+    store_vec3,
+    sub,
+    to_quat,
+)
+from particlesim.core.math3d import to_vec3 as vec
+from particlesim.dynamics.ccd.conservative_advancement import facing_edge
+from particlesim.dynamics.ccd.time_of_impact import sized_core
+from particlesim.dynamics.contact.contact_records import CONTACT_POINT, CONTACT_TERMS, NOBODY, OF_A, OF_B, OF_EDGES
+from particlesim.dynamics.contact.law import rest_threshold, restitution_of, tangent_of
+from particlesim.dynamics.settings import (
+    LEVEL_VERTICES,
+    LOSSLESS_REST,
+    MANIFOLD_MARGIN,
+    MAX_CORRECTION,
+    MAX_PARALLEL_TOLERANCE,
+    MAX_TURNING_SLACK,
+    MIN_EDGE_SINE,
+    REST_SLACK,
+    RESTING_PARALLEL_TOLERANCE,
+    RESTING_SUBSTEPS,
+    RESTITUTION_THRESHOLD_HEIGHT,
+    SAME_NORMAL,
+)
+from particlesim.geometry.narrow_phase.pair import pair_manifold
+from particlesim.geometry.support import is_half_space, is_sphere
+from particlesim.model.bodies import angular_velocity_change, per_mass, placed
+from particlesim.model.domain import nearest_image
+
+
+class Motion(NamedTuple):
+    """How bodies move in a step, and how fast they may become."""
+
+    spin: np.ndarray  # (n, 3) angular velocities [rad/s]
+    speed: np.ndarray  # (n,) bounds of surface speeds [m/s]
+    duration: float  # [s]
+
+
+class Search(NamedTuple):
+    """How far the search for contacts has come, and what is remembered of how near bodies are."""
+
+    round: np.ndarray  # (n,) int64, in which contacts of a body are searched, -1 before
+    loose: np.ndarray  # (n,) int64, whether a body has neighbours that it must collide with as others do
+    displacement: np.ndarray  # (n,) how far surfaces have come [m]
+    clearance: np.ndarray  # beside ``neighbours.other``: how far apart they were, plus displacements [m]
+
+
+class _Room(NamedTuple):
+    """Where the points of one pair are worked out."""
+
+    points: np.ndarray  # (MAX_MANIFOLD, 3) from a's position [m]
+    gaps: np.ndarray  # (MAX_MANIFOLD,) [m]
+
+
+@kernel
+def _with_nearest(room, count, nearest, gap, tolerance):
+    """Add the ``nearest`` point of two polyhedra, and its ``gap``, to a manifold that has none as near; how many."""
+    points, gaps = room
+    least = gaps[0]
+    for k in range(1, count):
+        least = min(least, gaps[k])
+    if least <= gap + tolerance:
+        return count
+    slot = min(count, MAX_MANIFOLD - 1)
+    store_vec3(points, slot, nearest)
+    gaps[slot] = gap
+    return slot + 1
+
+
+@kernel
+def _pair_points(system, a, b, reach, tilt, room):
+    """Contact points of two bodies within ``reach``, and the gaps there: (normal, offset, how many, least gap)."""
+    offset = nearest_image(sub(vec(b.position), vec(a.position)), system.domain[0].period)
+    gap = norm(offset) - a.radius - b.radius
+    if gap > reach:
+        return (0.0, 0.0, 0.0), offset, 0, gap
+    border = MANIFOLD_MARGIN * min(a.inradius, b.inradius)
+    limits = reach, tilt, min(reach, border)
+    gap, normal, middle, count = pair_manifold(
+        system.shapes, placed(a), placed(b), offset, limits, room.points, room.gaps
+    )
+    if count > 0:
+        count = _with_nearest(room, count, middle, gap, RESTITUTION_THRESHOLD_HEIGHT * border)
+    return normal, offset, count, gap
+
+
+@kernel
+def _response(a, b, arm_a, arm_b, impulse):
+    """The change of the velocity of b against a at a point by an impulse on b, and its reaction on a."""
+    of_a = add(
+        (per_mass(a, impulse[0]), per_mass(a, impulse[1]), per_mass(a, impulse[2])),
+        cross(angular_velocity_change(a, cross(arm_a, impulse)), arm_a),
+    )
+    of_b = add(
+        (per_mass(b, impulse[0]), per_mass(b, impulse[1]), per_mass(b, impulse[2])),
+        cross(angular_velocity_change(b, cross(arm_b, impulse)), arm_b),
+    )
+    return add(of_a, of_b)
+
+
+@kernel
+def _tangential_mass(a, b, arm_a, arm_b, normal):
+    """The smallest effective mass across the normal: 1 / the larger eigenvalue of the inverse mass there."""
+    first = tangent_of(normal)
+    second = cross(normal, first)
+    of_first, of_second = _response(a, b, arm_a, arm_b, first), _response(a, b, arm_a, arm_b, second)
+    p, q, r = dot(of_first, first), dot(of_second, second), dot(of_first, second)
+    return 1.0 / (0.5 * (p + q) + np.sqrt(0.25 * (p - q) * (p - q) + r * r))
+
+
+@kernel
+def _rolling_mass(a, b):
+    """The smallest effective moment of inertia of two bodies against each other [kg m^2]."""
+    of_a, of_b = a.inverse_inertia, b.inverse_inertia
+    return 1.0 / (max(of_a[0], of_a[1], of_a[2]) + max(of_b[0], of_b[1], of_b[2]))
+
+
+@kernel
+def _reach_of(system, a, b, displacement):
+    """How near two bodies come that move by a displacement against each other in the step, as contacts see it.
+
+    Returns the largest gap and inclination of features that are a contact, and whether they rebound in full.
+    """
+    inradius = min(a.inradius, b.inradius)
+    height = RESTITUTION_THRESHOLD_HEIGHT * inradius
+    if restitution_of(system, a, b) == 1.0:
+        return LOSSLESS_REST * height, RESTING_PARALLEL_TOLERANCE, True
+    # A corner that is turned by so much comes down on a face within the step.
+    tilt = min(max(RESTING_PARALLEL_TOLERANCE, displacement / inradius), MAX_PARALLEL_TOLERANCE)
+    return height + displacement + 2.0 * MAX_CORRECTION * inradius, tilt, False
+
+
+@kernel
+def _turning_slack(system, motion, i, j):
+    """How far turning may close a gap that the velocities of now do not show [m].
+
+    A point at r from the position of a body that turns at w accelerates by w x (w x r). Half-spaces do not turn, and
+    what comes down on them bends away from them.
+    """
+    a, b = system.body[i], system.body[j]
+    if is_half_space(system.shapes, b.shape_row):
+        return 0.0
+    turning = 0.0 if is_sphere(system.shapes, a.shape_row) else norm(load_vec3(motion.spin, i))
+    turning += 0.0 if is_sphere(system.shapes, b.shape_row) else norm(load_vec3(motion.spin, j))
+    angle, inradius = turning * motion.duration, min(a.inradius, b.inradius)
+    lever = a.radius + b.radius
+    return min(0.5 * angle * angle * lever / RESTING_SUBSTEPS, MAX_TURNING_SLACK * inradius)
+
+
+@kernel
+def _faces(system, b, direction):
+    """Whether a face of a polyhedron has ``direction`` for its normal."""
+    faces, shape, own = (
+        system.shapes.face,
+        system.shapes.shape[b.shape_row],
+        inverse_rotate(to_quat(b.orientation), direction),
+    )
+    found = False
+    for f in range(shape.first_face, shape.last_face):
+        found = found or dot(vec(faces[f].normal), own) > 1.0 - SAME_NORMAL
+    return found
+
+
+@kernel
+def _owner(system, a, b, normal):
+    """Whose face the normal of two bodies belongs to.
+
+    A plane that supports a polyhedron where a sphere is nearest goes on doing so as it turns with the polyhedron.
+    """
+    if is_half_space(system.shapes, b.shape_row):
+        return OF_B
+    sphere_a, sphere_b = is_sphere(system.shapes, a.shape_row), is_sphere(system.shapes, b.shape_row)
+    if sphere_a and sphere_b:
+        return NOBODY
+    if sphere_a or (not sphere_b and _faces(system, b, scale(normal, -1.0))):
+        return OF_B
+    if sphere_b or _faces(system, a, normal):
+        return OF_A
+    return OF_EDGES
+
+
+@kernel
+def _edge_facing(system, b, direction):
+    """The edge of a polyhedron that faces ``direction``, in world axes; (0, 0, 0) if a vertex or a face does."""
+    orientation = to_quat(b.orientation)
+    hull, core = (system.shapes.vertex, system.shapes.link), sized_core(system, b)
+    edge, lag, next_lag = facing_edge(hull, core, inverse_rotate(orientation, direction))
+    level = lag <= LEVEL_VERTICES < next_lag
+    return scale(rotate(orientation, edge), b.scale if level else 0.0)
+
+
+@kernel
+def _write_edges(system, a, b, normal, terms):
+    """Write how a normal turns that stays across the edges of two bodies that cross (see turning_with_edges)."""
+    edge_a, edge_b = _edge_facing(system, a, normal), _edge_facing(system, b, scale(normal, -1.0))
+    across_a, across_b = cross(normal, edge_a), cross(edge_b, normal)
+    area = dot(edge_a, across_b)
+    if abs(area) <= MIN_EDGE_SINE * norm(edge_a) * norm(edge_b):
+        terms.owner = NOBODY
+        return
+    set_vec3(terms.edge_a, edge_a)
+    set_vec3(terms.edge_b, edge_b)
+    set_vec3(terms.with_a, scale(across_b, 1.0 / area))
+    set_vec3(terms.with_b, scale(across_a, 1.0 / area))
+
+
+@kernel
+def _write_point(system, motion, p, terms, pair, arm, offset):
+    """Write contact point ``p`` of a pair of bodies, whose ``normal`` is known, and its ``terms``."""
+    a, b, normal = system.body[pair[0]], system.body[pair[1]], vec(p.normal)
+    law = system.law[a.material, b.material]
+    arm_b = sub(arm, offset)
+    p.a, p.b = pair
+    set_vec3(p.arm_a, arm)
+    set_vec3(p.arm_b, arm_b)
+    response = _response(a, b, arm, arm_b, normal)
+    set_vec3(p.response, response)
+    p.normal_mass, p.tangential_mass = 1.0 / dot(response, normal), 0.0
+    p.friction, p.static_friction = law.friction, law.static_friction
+    if law.static_friction > 0.0:
+        p.tangential_mass = _tangential_mass(a, b, arm, arm_b, normal)
+    p.wanted = p.push = 0.0
+    set_vec3(p.drag, (0.0, 0.0, 0.0))
+    terms.inradius = min(a.inradius, b.inradius)
+    terms.restitution, terms.threshold = law.restitution, rest_threshold(system, a, b)
+    terms.rolling_friction, terms.rolling_mass = law.rolling_friction, _rolling_mass(a, b)
+    of_a = add(vec(a.velocity), cross(load_vec3(motion.spin, pair[0]), arm))
+    of_b = add(vec(b.velocity), cross(load_vec3(motion.spin, pair[1]), arm_b))
+    terms.approach = dot(normal, sub(of_b, of_a))
+    for vector in (terms.roll, terms.impulse, terms.angular_impulse, terms.force, terms.torque):
+        set_vec3(vector, (0.0, 0.0, 0.0))
+    terms.pushed = 0.0
+
+
+@kernel
+def add_contact(system, motion, pair, clear, room, found, size):
+    """Add the points of a pair of bodies (i, j) that may close to ``found`` (points, terms), which has ``size``.
+
+    Returns how many there are then, how far apart the bodies are at least, which is ``clear`` or more, and whether they
+    must collide as others do: what rebounds in full is in lasting contact only where it is quite still. There must be
+    room for MAX_MANIFOLD more.
+    """
+    i, j = pair
+    a, b = system.body[i], system.body[j]
+    displacement = (motion.speed[i] + motion.speed[j]) * motion.duration
+    reach, tilt, lossless = _reach_of(system, a, b, displacement)
+    if clear > reach:
+        return size, clear, lossless
+    normal, offset, count, clear = _pair_points(system, a, b, reach, tilt, room)
+    turning = 0.0 if lossless else _turning_slack(system, motion, i, j)
+    owner = _owner(system, a, b, normal) if count > 0 else NOBODY
+    points, terms = found
+    for k in range(count):
+        p, t = points[size + k], terms[size + k]
+        set_vec3(p.normal, normal)
+        _write_point(system, motion, p, t, pair, load_vec3(room.points, k), offset)
+        if lossless and abs(t.approach) > t.threshold * LOSSLESS_REST:
+            return size, clear, True
+        t.gap, t.separation = room.gaps[k], clear
+        t.slack, t.owner = turning + REST_SLACK * t.inradius, owner
+        t.round_a, t.round_b = is_sphere(system.shapes, a.shape_row), is_sphere(system.shapes, b.shape_row)
+        if owner == OF_EDGES:
+            _write_edges(system, a, b, normal, t)
+    return size + count, clear, lossless
+
+
+@entry_kernel
+def contacts_of(system, neighbours, motion, search, indices, first, last):
+    """Contact points (m,) and their terms of bodies ``indices[first:last]``, those of the present round of a search.
+
+    Of pairs within the round, and of those with bodies of later rounds: each stands there once.
+    """
+    system, neighbours, motion, search, indices = without_refcounts((system, neighbours, motion, search, indices))
+    room = _Room(np.empty((MAX_MANIFOLD, 3)), np.empty(MAX_MANIFOLD))
+    points, terms = np.empty(64, dtype=CONTACT_POINT), np.empty(64, dtype=CONTACT_TERMS)
+    size = 0
+    for k in range(first, last):
+        i = indices[k]
+        place, now = neighbours.place[i], search.round[i]
+        for j in range(system.bounded, len(system.body)):
+            if size + MAX_MANIFOLD > len(points):
+                points, terms = grow_records(points), grow_records(terms)
+            size, _, loose = add_contact(system, motion, (i, j), -np.inf, room, (points, terms), size)
+            search.loose[i] |= loose
+        for near in range(neighbours.start[place], neighbours.start[place + 1]):
+            j = neighbours.body[neighbours.other[near]]
+            if search.round[j] >= 0 and (search.round[j] < now or j < i):
+                continue
+            if size + MAX_MANIFOLD > len(points):
+                points, terms = grow_records(points), grow_records(terms)
+            come, pair = search.displacement[i] + search.displacement[j], (min(i, j), max(i, j))
+            clear = search.clearance[near] - come
+            size, clear, loose = add_contact(system, motion, pair, clear, room, (points, terms), size)
+            search.clearance[near] = clear + come
+            search.loose[i] |= loose
+    return points[:size], terms[:size]
+
+
+@kernel
+def _rests(terms, points, size, gravity):
+    """Whether bodies hardly move against each other at one of these points, and gravity presses them together there."""
+    for k in range(size):
+        t = terms[k]
+        near = RESTITUTION_THRESHOLD_HEIGHT * t.inradius * (LOSSLESS_REST if t.restitution == 1.0 else 1.0)
+        if t.gap <= near and abs(t.approach) <= t.threshold and dot(vec(points[k].normal), gravity) > 0.0:
+            return True
+    return False
+
+
+@entry_kernel
+def resting_on_obstacles(system, neighbours, motion, rests, first, last):
+    """Mark in ``rests`` (n,) those of particles ``first .. last`` that gravity presses against an obstacle."""
+    system, neighbours, motion, rests = without_refcounts((system, neighbours, motion, rests))
+    room = _Room(np.empty((MAX_MANIFOLD, 3)), np.empty(MAX_MANIFOLD))
+    points, terms = np.empty(MAX_MANIFOLD, dtype=CONTACT_POINT), np.empty(MAX_MANIFOLD, dtype=CONTACT_TERMS)
+    gravity = vec(system.domain[0].gravity)
+    for i in range(first, last):
+        for j in range(system.bounded, len(system.body)):
+            if not rests[i]:
+                size, _, _ = add_contact(system, motion, (i, j), -np.inf, room, (points, terms), 0)
+                rests[i] = _rests(terms, points, size, gravity)
+        place = neighbours.place[i]
+        for near in range(neighbours.start[place], neighbours.start[place + 1]):
+            j = neighbours.body[neighbours.other[near]]
+            if j >= system.particles and not rests[i]:
+                size, _, _ = add_contact(system, motion, (i, j), -np.inf, room, (points, terms), 0)
+                rests[i] = _rests(terms, points, size, gravity)

@@ -1,0 +1,112 @@
+"""Islands of lasting contacts: bodies that touch each other, and their points in an order that nothing else decides.
+
+What happens in one island does not touch the others. Obstacles join nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
+from particlesim.core.math3d import dot, sub
+from particlesim.core.math3d import to_vec3 as vec
+from particlesim.dynamics.contact.island_step import Islands
+from particlesim.dynamics.solver_state import FORCE
+
+
+@kernel
+def _root(root, i):
+    """The smallest member of an island; on the way each is led there more directly."""
+    while root[i] != i:
+        root[i] = root[root[i]]
+        i = root[i]
+    return i
+
+
+@entry_kernel
+def _roots(points, particles):
+    """The smallest member of the island of each particle, (particles,)."""
+    points = without_refcounts(points)
+    root = np.arange(particles)
+    for k in range(len(points)):
+        if points[k].b < particles:
+            a, b = _root(root, points[k].a), _root(root, points[k].b)
+            root[max(a, b)] = min(a, b)
+    for i in range(particles):
+        root[i] = _root(root, i)
+    return root
+
+
+def gathered(points: np.ndarray, terms: np.ndarray, seeds: np.ndarray, particles: int) -> Islands:
+    """The islands of contact points (m,) that have a seed among their members, by their smallest members.
+
+    Parameters
+    ----------
+    points, terms : (m,) CONTACT_POINT, CONTACT_TERMS
+        In any order but that the points of a pair of bodies have theirs.
+    seeds : (k,) int
+        Particles.
+    particles : int
+        How many there are.
+    """
+    root = _roots(points, particles)
+    seeded = np.zeros(particles, dtype=np.bool_)
+    seeded[root[seeds]] = True
+    of_point = root[points["a"]]
+    order = np.lexsort((points["b"], points["a"], of_point))
+    order = order[seeded[of_point[order]]]
+    points, terms, of_point = points[order], terms[order], of_point[order]
+    touched = np.zeros(particles, dtype=np.bool_)
+    touched[points["a"]] = True
+    touched[points["b"][points["b"] < particles]] = True
+    member = np.flatnonzero(touched)
+    member = member[np.argsort(root[member], kind="stable")]
+    starts = np.flatnonzero(np.diff(of_point, prepend=-1))
+    first_member = np.searchsorted(root[member], of_point[starts])
+    first_point, lost = np.append(starts, len(points)), np.zeros(len(starts))
+    return Islands(first_point, points, terms, np.append(first_member, len(member)), member, lost)
+
+
+@entry_kernel
+def _hand_down(points, terms, first, last, memory):
+    """See ``warm_start``; the contact of force ``k`` now has the points ``first[k] .. last[k]``."""
+    points, terms, memory = without_refcounts((points, terms, memory))
+    for k in range(len(memory)):
+        nearest, least = -1, np.inf
+        for m in range(first[k], last[k]):
+            shift = sub(vec(points[m].arm_a), vec(memory[k].arm))
+            if dot(shift, shift) < least:
+                nearest, least = m, dot(shift, shift)
+        if nearest >= 0:
+            for axis in range(3):
+                terms[nearest].force[axis] += memory[k].force[axis]
+                terms[nearest].torque[axis] += memory[k].torque[axis]
+
+
+def _contact_of(points: np.ndarray, bodies: int) -> np.ndarray:
+    """A number for the pair of bodies at each contact point."""
+    return points["a"].astype(np.int64) * bodies + points["b"]
+
+
+def warm_start(islands: Islands, forces: np.ndarray, bodies: int) -> None:
+    """Give contact points the ``forces`` (k,) FORCE of the step before, each to the nearest of the same contact.
+
+    The corners of a patch come in any order, and may be fewer or more than before; no force is lost.
+    """
+    contact = _contact_of(islands.points, bodies)
+    order = np.argsort(contact, kind="stable")
+    known, by_contact = forces["contact"], contact[order]
+    first, last = np.searchsorted(by_contact, known), np.searchsorted(by_contact, known, side="right")
+    # The points of a contact stand in a row.
+    begin = order[np.minimum(first, len(order) - 1)] if len(order) else first
+    _hand_down(islands.points, islands.terms, begin, begin + (last - first), forces)
+
+
+def forces_after(islands: Islands, bodies: int) -> np.ndarray:
+    """The forces of contact points for the step after, (m,) FORCE: those that there are."""
+    points, terms = islands.points, islands.terms
+    acting = terms["force"].any(axis=1)
+    forces = np.empty(int(acting.sum()), dtype=FORCE)
+    forces["contact"], forces["arm"] = _contact_of(points, bodies)[acting], points["arm_a"][acting]
+    forces["force"], forces["torque"] = terms["force"][acting], terms["torque"][acting]
+    return forces

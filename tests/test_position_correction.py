@@ -1,0 +1,73 @@
+"""Bodies that would be in each other at the end of a step are pushed apart there, and nothing else changes."""
+
+import numpy as np
+import pytest
+
+from particlesim.dynamics.contact.cone_solver import MOVER
+from particlesim.dynamics.contact.contact_records import CONTACT_POINT, CONTACT_TERMS
+from particlesim.dynamics.contact.island_step import Islands
+from particlesim.dynamics.contact.movers import write_mover
+from particlesim.dynamics.contact.position_correction import correct_positions
+from particlesim.dynamics.settings import CORRECTED_DEPTH, HELD_BACK_DEPTH
+from tests.kernels import callable_from_python
+from tests.touching import contact_of, nearly_touching
+
+correct = callable_from_python(correct_positions)
+write = callable_from_python(write_mover)
+
+
+def island(system):
+    """The island of two bodies that are in contact somewhere."""
+    points, terms = np.zeros(1, dtype=CONTACT_POINT), np.zeros(1, dtype=CONTACT_TERMS)
+    points["b"], terms["inradius"] = 1, system.body["inradius"][:2].min()
+    terms["separation"] = contact_of(system, system.body)[0]
+    return Islands(np.array([0, 1]), points, terms, np.array([0, 2]), np.arange(2), np.zeros(1))
+
+
+def corrected(sim, depth):
+    """Two bodies that would be so deep in each other [inradii]: records ahead before and after, and if held back."""
+    system = sim.model.system
+    _, contact, _ = contact_of(system, system.body)
+    ahead = system.body.copy()
+    ahead["position"][1] -= depth * system.body["inradius"].min() * contact["normal"]
+    mover, before = np.zeros(2, dtype=MOVER), ahead.copy()
+    for k in range(2):
+        write(mover[k], system.body[k], k)
+    held = correct(system, island(system), mover, (0, 1), ahead, 2)
+    return before, ahead, held
+
+
+SHAPES = [("sphere", "sphere"), ("sphere", "cube"), ("pyramid", "sphere"), ("cube", "pyramid"), ("cube", "cube")]
+
+
+@pytest.mark.parametrize("shapes", SHAPES)
+def test_what_is_in_each_other_a_little_is_pushed_apart(shapes):
+    for seed in range(20):
+        sim = nearly_touching(seed, shapes)
+        system, mass = sim.model.system, sim.particles.mass
+        before, ahead, held = corrected(sim, 0.02)
+        assert not held
+        assert contact_of(system, ahead)[0] >= -CORRECTED_DEPTH * system.body["inradius"].min()
+        for name in ("velocity", "angular_momentum"):
+            assert np.array_equal(ahead[name], before[name])
+        moved = mass @ (ahead["position"] - before["position"])
+        assert np.abs(moved).max() < 1e-12 * mass.sum()
+        for k, shape in enumerate(shapes):
+            if shape == "sphere":
+                assert np.allclose(ahead["orientation"][k], before["orientation"][k], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("shapes", SHAPES)
+def test_what_is_deep_in_each_other_collides_and_is_held_back(shapes):
+    for seed in range(20):
+        sim = nearly_touching(seed, shapes)
+        system, mass = sim.model.system, sim.particles.mass
+        before, ahead, held = corrected(sim, 0.5)
+        assert held
+        assert contact_of(system, ahead)[0] >= -HELD_BACK_DEPTH * system.body["inradius"].min()
+        given = mass @ (ahead["velocity"] - before["velocity"])
+        assert np.abs(given).max() < 1e-12 * mass.sum()
+        energies = [(mass * (b["velocity"] ** 2).sum(axis=1)).sum() for b in (before, ahead)]
+        turned = [(b["angular_momentum"] ** 2 / b["principal_inertia"]).sum() for b in (before, ahead)]
+        if all(shape in ("sphere", "cube") for shape in shapes):
+            assert energies[1] + turned[1] <= (energies[0] + turned[0]) * (1.0 + 1e-12)
