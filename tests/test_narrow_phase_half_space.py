@@ -59,17 +59,38 @@ def test_separation_and_points_in_any_direction():
         assert call_pair_overlaps(TABLE, body, wall, offset, POINTS) == (separation <= 0.0)
 
 
-def test_points_within_reach_are_the_nearest():
+def test_points_within_reach_are_all_or_the_nearest_and_some():
     for body, wall, offset, lowest, normal in random_cases(500):
         reach = lowest - normal @ offset + 0.3 * SHAPES[body[0]].radius * body[1]
         separation, _, _, count = call_pair_manifold(TABLE, body, wall, offset, (reach, 0.1, 0.0), POINTS, GAPS)
         surface = oracles.corners(SHAPES[body[0]], body[1], body[2]) - SHAPES[body[0]].rounding * body[1] * normal
-        expected = np.sort((surface - offset) @ normal)
-        expected = expected[expected <= reach][:MAX_MANIFOLD]
-        assert count == len(expected)
-        np.testing.assert_allclose(np.sort(GAPS[:count]), expected, atol=1e-13)
+        there = np.sort((surface - offset) @ normal)
+        there = there[there <= reach]
+        gaps = np.sort(GAPS[:count])
+        assert count == min(len(there), MAX_MANIFOLD)
+        if len(there) <= MAX_MANIFOLD:
+            np.testing.assert_allclose(gaps, there, atol=1e-13)
+        which = np.abs(there[:, None] - gaps).argmin(axis=0)
+        assert len(np.unique(which)) == count
+        np.testing.assert_allclose(gaps, there[which], atol=1e-13)
         np.testing.assert_allclose((POINTS[:count] - offset) @ normal, GAPS[:count], atol=1e-13)
-        assert separation == pytest.approx(expected[0], abs=1e-13)
+        assert separation == pytest.approx(there[0], abs=1e-13)
+        assert gaps[0] == pytest.approx(there[0], abs=1e-13)
+
+
+@pytest.mark.parametrize("lean", [0.0, 1e-6, 1e-4])
+def test_a_round_base_stands_on_points_all_round(lean):
+    """Of a hundred corners, whichever is lowest by a hair, those that are kept hold it on every side."""
+    angles = 2.0 * np.pi * np.arange(100) / 100
+    rim = np.column_stack((0.5 * np.cos(angles), 0.5 * np.sin(angles)))
+    drum = shapes.hull("drum", np.concatenate([np.column_stack((rim, np.full(100, z))) for z in (-0.5, 0.5)]))
+    table = stack_shapes([drum, shapes.half_space((0.0, 0.0, 1.0))])
+    body, floor = (0, 1.0, tuple(about((1, 2, 0), np.degrees(lean)))), (1, 1.0, UPRIGHT)
+    _, _, _, count = call_pair_manifold(table, body, floor, (0.0, 0.0, -0.5), (0.01, 0.1, 0.0), POINTS, GAPS)
+    assert count == MAX_MANIFOLD
+    seen = np.sort(np.arctan2(POINTS[:count, 1], POINTS[:count, 0]))
+    assert np.diff(np.append(seen, seen[0] + 2.0 * np.pi)).max() < 1.2
+    assert np.hypot(POINTS[:count, 0], POINTS[:count, 1]).min() == pytest.approx(0.5, abs=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -111,3 +111,8 @@ PARALLEL_TOLERANCE = 1e-8
 # Fraction of the length of an edge by which corners outside of it still lie on the face: rounding, and edges that
 # coincide. Smaller: a box on a box of the same size loses corners of its patch.
 ON_EDGE = 1e-9
+
+# Of more corners near a plane than a manifold has points, those are kept that are farthest out, but as much nearer to
+# the plane as this slope [1] where they are less far out. Larger: what rolls on a fine mesh lacks the corners next to
+# the lowest; smaller: what lies flat but for rounding lies on corners of one side, and rocks.
+SPREAD_SLOPE = 1e-2
