@@ -65,8 +65,8 @@ def test_bodies_without_friction_take_the_nearest_motion_that_closes_no_gap(monk
 
     original = resting.RestingContacts._step
 
-    def step(self, islands, duration):
-        left = original(self, islands, duration)
+    def step(self, islands, duration, until_fields):
+        left = original(self, islands, duration, until_fields)
         seen["points"], seen["terms"], seen["duration"] = islands.points.copy(), islands.terms.copy(), duration
         return left
 
@@ -185,11 +185,3 @@ def test_pairs_that_meet_do_not_sink_into_each_other(shapes, restitution):
         assert (np.diff(energies) <= 1e-12 * energies[0]).all()
         assert deepest < 1e-3 * 0.4
         assert np.abs(sim.ledger.momentum).max() < 1e-12
-
-
-def test_inelastic_balls_thrown_at_a_wall_take_bounded_work():
-    balls = {"shape": "sphere", "count": 12, "size": 0.3, "velocity": (5.0, 0, 0)}
-    sim, energies, deepest = run_watched(scene(balls, size=(2, 1, 1), restitution=0.2, seed=3), 4.0, 40)
-    assert (np.diff(energies) <= 1e-12 * energies[0]).all()
-    assert sim.ledger.impacts < 20_000
-    assert deepest < 1e-3 * 0.3

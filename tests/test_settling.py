@@ -125,7 +125,7 @@ def test_forces_go_to_the_nearest_points_of_the_same_contact():
     before["arm"][:, 0] = 2.1, 1.2, 0.8, 5.0, -4.0
     before["force"][:, 2] = before["torque"][:, 1] = 10.0, 20.0, 30.0, 40.0, 50.0
     bounds = np.array([0, 4])
-    warm_start(Islands(bounds, points, terms, bounds, np.arange(4), np.zeros(1)), before, 10)
+    warm_start(Islands(bounds, points, terms, bounds, np.arange(4), np.zeros((1, 4)), np.zeros(1)), before, 10)
     assert terms["force"][:, 2].tolist() == [50.0, 10.0, 50.0, 0.0]
     assert terms["torque"][:, 1].tolist() == [50.0, 10.0, 50.0, 0.0]
 

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import axpy, dot, norm, set_quat, set_vec3, sub, to_quat, to_vec3
+from particlesim.core.parallel import ThreadTeam
 from particlesim.dynamics.ccd.swept_bounds import largest_acceleration
+from particlesim.dynamics.settings import SUM_BLOCK
 from particlesim.model.domain import nearest_image
 from particlesim.model.free_motion import angular_speed, free_rotation, isotropic_rotation
+from particlesim.model.system import System
 
 
 @kernel
@@ -124,3 +129,13 @@ def sum_speeds(system, block_size, sums, first, last):
             falls += gravity / b.radius
         sums[block, 0], sums[block, 1] = squares, falls
     return math.sqrt(fastest)
+
+
+def typical_speeds(system: System) -> tuple[float, float, float]:
+    """Of particles, in radii: speed of surfaces (root mean square) [1/s], gravity [1/s^2]; and the largest speed [m/s]."""
+    sums = np.empty((-(-system.particles // SUM_BLOCK), 2))
+    of_blocks = ThreadTeam(system.particles).each(
+        lambda _, first, last: sum_speeds(system, SUM_BLOCK, sums, first, last), len(sums)
+    )
+    squares, falls = sums.sum(axis=0) / system.particles
+    return math.sqrt(squares), falls, max(of_blocks)

@@ -30,10 +30,15 @@ class Kicks:
         """Whether anything acts on the particles of a model."""
         return bool(len(model.fields) or self.forces)
 
-    def act(self, model: Model, duration: float, backwards: bool) -> float:
-        """Let fields, then forces, act for ``duration`` [s], or ``backwards``, the last one first; their work [J]."""
+    def act(self, model: Model, duration: float, backwards: bool) -> tuple[float, np.ndarray]:
+        """Let fields, then forces, act for ``duration`` [s], or ``backwards``, the last one first.
+
+        Returns their work [J], and the accelerations of the particles, (n, 3) [m/s^2].
+        """
         acts = [partial(_by_fields, backwards=backwards), *(partial(_by_force, force=force) for force in self.forces)]
-        return sum(act(model, duration) for act in (reversed(acts) if backwards else acts))
+        before = model.particles["velocity"].copy()
+        work = sum(act(model, duration) for act in (reversed(acts) if backwards else acts))
+        return work, (model.particles["velocity"] - before) / duration
 
 
 def _by_fields(model: Model, duration: float, backwards: bool) -> float:

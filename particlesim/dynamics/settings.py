@@ -192,8 +192,8 @@ SWEEP_CONVERGED = 1e-10
 # in a part of the substep [1]: a fifth of the depth that is corrected.
 NEAR_SWEEP_CONVERGED = 2e-5
 
-# A last sweep that changes a velocity by more than this fraction of what gravity adds in a substep has left something
-# undone that counts [1].
+# A last sweep that changes a velocity by more than this fraction of what gravity adds in a substep, or of what sinks in
+# by the depth that is corrected in a part of it, has left something undone that counts [1].
 UNRESOLVED_VELOCITY = 1.0
 
 # Bodies come to rest this fraction of the inscribed radius apart [1]. What sweeps leave undone they sink into this

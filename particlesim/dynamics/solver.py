@@ -16,13 +16,13 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from particlesim.core.constants import DISSIPATION
 from particlesim.core.parallel import ThreadTeam
-from particlesim.dynamics.advance import advance, sum_speeds, time_within_skins
+from particlesim.dynamics.advance import advance, time_within_skins, typical_speeds
 from particlesim.dynamics.ccd.swept_bounds import BOUND
 from particlesim.dynamics.ccd.undisturbed import check_work, longest_stretch
-from particlesim.dynamics.contact.booking import IMPACTS, LOST, SHEAR, VIRIAL, WALLS, WORK, columns_needed
-from particlesim.dynamics.contact.resting import Borne, RestingContacts, forget_clearance
+from particlesim.dynamics.contact.booking import Borne, columns_needed
+from particlesim.dynamics.contact.lasting_islands import forces_of
+from particlesim.dynamics.contact.resting import RestingContacts, forget_clearance
 from particlesim.dynamics.events.collision_prediction import Predicted, bound_paths, predict, predict_across
 from particlesim.dynamics.events.event_queue import run_islands
 from particlesim.dynamics.events.islands import Islands, add_up, newly_touched, unite
@@ -52,9 +52,8 @@ from particlesim.dynamics.settings import (
     MAX_SUBSTEP_DISPLACEMENT,
     SEARCHES_PER_SORT,
     STRAYED_SKIN,
-    SUM_BLOCK,
 )
-from particlesim.dynamics.solver_state import FORCE, SEEN, Counts, SolverState
+from particlesim.dynamics.solver_state import Counts, SolverState, nothing_remembered
 from particlesim.model.prescribed_motion import changes_within, place_kinematic
 from particlesim.model.system import Model
 
@@ -106,39 +105,25 @@ class Solver:
         origin : (n,) int
             Which of the particles before each of them was, -1 for new ones.
         """
-        each = np.where(origin >= 0, np.append(self.counts.each, 0)[origin], 0)
-        self.counts.each = each.astype(np.int64)
+        before, bodies = self.state, len(self._system.body)
+        self.counts.each = np.where(origin >= 0, np.append(self.counts.each, 0)[origin], 0).astype(np.int64)
         self._take(self.model.with_particles(particles))
-        self.state = self._begin(self.state.time)
+        self.state = self._begin(before.time)
+        # What stays goes on from the forces that it is held by.
+        if len(before.lasting):
+            self.state.lasting = np.append(before.lasting, np.int8(0))[origin]
+            self.state.forces = forces_of(before.forces, origin, bodies, len(self._system.body))
 
     def _begin(self, now: float) -> SolverState:
         """The state of a start at a time [s]."""
         system, body = self._system, self._system.body
         body["resting"] = body["disturbed"] = body["time"] = 0
         place_kinematic(body, system.motion, now)
-        # Where nothing can come to rest, nothing need be remembered of how near bodies are.
-        known = system.bounded if self._resting.known else 0
-        seen = np.zeros(known, dtype=SEEN)
-        for name in SEEN.names or ():
-            seen[name] = body[name][:known]
         order = order_of(np.ascontiguousarray(body["position"][: system.bounded]), system.domain[0]["period"])
         skin = np.empty(system.bounded)
         self._write_skins(skin, 0.0)
         neighbours = self._search(body["position"], skin, order)
-        state = SolverState(
-            time=now,
-            order=order,
-            searches=1,
-            skin=skin,
-            time_within_skins=-1.0,
-            neighbours=neighbours,
-            standing=np.zeros(len(body) if known else 0, dtype=np.int64),
-            seen=seen,
-            displacement=np.zeros(known),
-            clearance=np.empty(0),
-            forces=np.empty(0, dtype=FORCE),
-            lasting=np.zeros(system.particles if known else 0, dtype=np.int8),
-        )
+        state = SolverState(now, order, 1, skin, -1.0, neighbours, *nothing_remembered(system, self._resting.known))
         forget_clearance(state, neighbours)
         return state
 
@@ -157,19 +142,12 @@ class Solver:
         system = self._system
         if not system.particles:
             return math.inf
-        sums = np.empty((-(-system.particles // SUM_BLOCK), 2))
-        of_blocks = ThreadTeam(system.particles).each(
-            lambda _, first, last: sum_speeds(system, SUM_BLOCK, sums, first, last), len(sums)
-        )
-        squares, falls = sums.sum(axis=0) / system.particles
-        longest = min(time_for(displacement, math.sqrt(squares), falls), self._resting.longest_substep(self.state))
-        return min(longest, self._periodic_limit(max(of_blocks)))
-
-    def _periodic_limit(self, fastest: float) -> float:
-        """In how long [s] two bodies that close in at twice the ``fastest`` speed [m/s] come near another image."""
+        speed, falls, fastest = typical_speeds(system)
+        lasting = self._resting.longest_substep(self.state, self.kicks.there_are(self.model))
+        longest = min(time_for(displacement, speed, falls), lasting)
         if self._periodic_room == math.inf:
-            return math.inf
-        return time_for(self._periodic_room, fastest, float(np.linalg.norm(self._system.domain[0]["gravity"])))
+            return longest
+        return min(longest, time_for(self._periodic_room, fastest, float(np.linalg.norm(system.domain[0]["gravity"]))))
 
     def longest_step(self, displacement: float, most: float) -> float:
         """As ``longest_substep``, or for how long nothing touches anything if that is far longer, up to ``most``."""
@@ -224,8 +202,11 @@ class Solver:
         """Let fields and other forces act on all particles in place (see kicks.py)."""
         if not self.kicks.there_are(self.model):
             return
-        self.counts.work += self.kicks.act(self.model, duration, backwards)
         system, state = self._system, self.state
+        work, acceleration = self.kicks.act(self.model, duration, backwards)
+        self.counts.work += work
+        if not backwards:
+            self._resting.let_fields_act(acceleration, state.time + duration)
         state.time_within_skins = time_within_skins(system, state.neighbours.reference, 0, system.bounded)
 
     @contextmanager
@@ -301,7 +282,7 @@ class Solver:
         if done:
             self._book(total, disturbed, borne, unfinished)
         else:
-            often = disturbed[clock["impacts"][disturbed] > FEW_IMPACTS]
+            often = disturbed[clock["stamp"][disturbed] >= FEW_IMPACTS]
             rewind(paths, system.body, disturbed)
             self._resting.release()
             if few and duration <= LASTING_STEP:
@@ -406,15 +387,6 @@ class Solver:
 
     def _book(self, total: np.ndarray, disturbed: np.ndarray, borne: Borne, unfinished: int) -> None:
         """Add what the islands accumulated, and what resting contacts bore, to the counts."""
-        counts = self.counts
-        counts.each[disturbed] += self._clock["impacts"][disturbed]
-        counts.impacts += int(total[IMPACTS])
-        counts.virial += float(total[VIRIAL]) + borne.virial
-        columns = slice(WALLS, LOST), slice(LOST, SHEAR), slice(SHEAR, WORK)
-        for sums, place in zip((counts.wall_impulse, counts.dissipated, counts.wall_shear), columns, strict=True):
-            sums.flat[: len(total[place])] += total[place]
-        counts.work += float(total[WORK:].sum())
-        counts.wall_impulse += borne.wall_impulse
-        counts.wall_shear += borne.wall_shear
-        counts.dissipated[DISSIPATION.index("rest")] += borne.lost
-        counts.unresolved += unfinished > 0 or borne.unresolved
+        self.counts.each[disturbed] += self._clock["impacts"][disturbed]
+        self.counts.add(total, borne)
+        self.counts.unresolved += unfinished > 0 or borne.unresolved

@@ -10,7 +10,9 @@ import numpy as np
 
 from particlesim.core.constants import DISSIPATION
 from particlesim.core.records import record
+from particlesim.dynamics.contact.booking import IMPACTS, LOST, SHEAR, VIRIAL, WALLS, WORK, Borne
 from particlesim.dynamics.neighbour_list import NeighbourList, Order
+from particlesim.model.system import System
 
 # A pose that displacements are counted from.
 SEEN = record([("position", "f8", (3,)), ("orientation", "f8", (4,))])
@@ -34,6 +36,18 @@ class Counts:
     pairs_tested: int = 0  # boxes compared by the broad phase
     candidate_pairs: int = 0  # pairs it found
     unresolved: int = 0  # substeps in which more happened than was worked through (see MAX_IMPACTS)
+
+    def add(self, total: np.ndarray, borne: Borne) -> None:
+        """Add what the islands of a substep accumulated (c,), and what lasting contacts bore."""
+        self.impacts += int(total[IMPACTS])
+        self.virial += float(total[VIRIAL]) + borne.virial
+        columns = slice(WALLS, LOST), slice(LOST, SHEAR), slice(SHEAR, WORK)
+        for sums, place in zip((self.wall_impulse, self.dissipated, self.wall_shear), columns, strict=True):
+            sums.flat[: len(total[place])] += total[place]
+        self.work += float(total[WORK:].sum()) + borne.work
+        self.wall_impulse += borne.wall_impulse
+        self.wall_shear += borne.wall_shear
+        self.dissipated += borne.lost
 
 
 @dataclass
@@ -75,6 +89,19 @@ class SolverState:
             else:
                 values[name] = arrays[name].item() if arrays[name].ndim == 0 else arrays[name]
         return cls(**values)
+
+
+def nothing_remembered(system: System, comes_to_rest: bool) -> tuple[np.ndarray, ...]:
+    """The last six arrays of a SolverState at a start; they are empty where nothing comes to rest."""
+    body, known = system.body, system.bounded if comes_to_rest else 0
+    seen = np.zeros(known, dtype=SEEN)
+    for name in SEEN.names or ():
+        seen[name] = body[name][:known]
+    standing, lasting = (
+        np.zeros(len(body) if known else 0, np.int64),
+        np.zeros(system.particles if known else 0, np.int8),
+    )
+    return standing, seen, np.zeros(known), np.empty(0), np.empty(0, dtype=FORCE), lasting
 
 
 def digest(*arrays: np.ndarray) -> str:

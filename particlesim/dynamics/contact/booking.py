@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from particlesim.core.constants import WALL_NAMES
+from typing import NamedTuple
+
+import numpy as np
+
+from particlesim.core.constants import DISSIPATION, WALL_NAMES
 from particlesim.core.jit import kernel
 from particlesim.core.math3d import dot, to_vec3
 from particlesim.model.bodies import DYNAMIC
@@ -15,6 +19,20 @@ LOST = WALLS + len(WALL_NAMES)
 SHEAR = LOST + 3
 WORK = SHEAR + 3 * len(WALL_NAMES)
 _END = WORK + 1
+
+
+class Borne(NamedTuple):
+    """What lasting contacts bore in a step."""
+
+    wall_impulse: np.ndarray  # (6,) [N s]
+    wall_shear: np.ndarray  # (6, 3) [N s]
+    virial: float  # [J s]
+    lost: np.ndarray  # (4,) energy by the causes in DISSIPATION [J]
+    work: float  # that obstacles did [J]
+    unresolved: bool  # whether the bound on the work was reached
+
+
+NOTHING_BORNE = Borne(np.zeros(6), np.zeros((6, 3)), 0.0, np.zeros(len(DISSIPATION)), 0.0, False)
 
 
 def columns_needed(system: System) -> int:

@@ -16,17 +16,27 @@ from particlesim.core.math3d import (
     to_quat,
     to_vec3,
 )
+from particlesim.dynamics.ccd.swept_bounds import largest_acceleration
 from particlesim.dynamics.settings import SPEED_HANDED_ON
+from particlesim.model.bodies import KINEMATIC
 from particlesim.model.domain import nearest_image
 
 
 @entry_kernel
-def surface_speeds(body, spin, count):
-    """How fast the surface of each of ``count`` bodies moves at most, (n,) [m/s], 0 for those beyond."""
-    body, spin = without_refcounts((body, spin))
-    speed = np.zeros(len(body))
-    for i in range(count):
-        speed[i] = norm(to_vec3(body[i].velocity)) + norm(load_vec3(spin, i)) * body[i].radius
+def surface_speeds(system, spin, duration):
+    """How fast the surface of each body moves at most, of obstacles within ``duration`` [s], (n,) [m/s].
+
+    Of half-spaces without what turning does, which depends on where.
+    """
+    system, spin = without_refcounts((system, spin))
+    speed = np.zeros(len(system.body))
+    for i in range(len(speed)):
+        b = system.body[i]
+        speed[i] = norm(to_vec3(b.velocity))
+        if i < system.bounded:
+            speed[i] += norm(load_vec3(spin, i)) * b.radius
+        if b.kind == KINEMATIC:
+            speed[i] += largest_acceleration(system, b) * duration
     return speed
 
 

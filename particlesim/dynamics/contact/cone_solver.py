@@ -39,6 +39,8 @@ MOVER = record(
         ("before", "f8", (6,)),  # velocity and angular velocity at the start of the step
         ("trial_velocity", "f8", (3,)),  # what impulses that are tried do to it
         ("trial_spin", "f8", (3,)),
+        ("mean", "f8", (6,)),  # velocity and angular velocity as a part of the step begins, then their means in it
+        ("pull", "f8", (3,)),  # acceleration by gravity and fields [m/s^2]
         ("row", "i8"),  # its number among the members of its island, -1 of an obstacle
     ]
 )
@@ -115,12 +117,12 @@ def _resist_rolling(p, t, a, b):
 
 @kernel
 def _visit(p, a, b):
-    """Let a contact point have the normal velocity wanted at least, and not slide, as far as its cone allows.
+    """Let a contact point have the velocity wanted: along the normal at least, across it as far as its cone allows.
 
     Returns by how much a velocity there changed.
     """
-    velocity, normal = relative_velocity(p, a, b), vec(p.normal)
-    more = max(-p.push, (p.wanted - dot(normal, velocity)) * p.normal_mass)
+    velocity, normal = sub(relative_velocity(p, a, b), vec(p.wanted)), vec(p.normal)
+    more = max(-p.push, -dot(normal, velocity) * p.normal_mass)
     p.push += more
     change, impulse = abs(more) / p.normal_mass, scale(normal, more)
     if p.static_friction > 0.0:
@@ -212,8 +214,7 @@ def _conjugate_gradients(points, mover, span, members, small):
     along = 0.0
     for k in range(size):
         p = points[span[0] + k]
-        lack = sub(scale(vec(p.normal), p.wanted), relative_velocity(p, mover[p.a], mover[p.b]))
-        lack = _free_part(p, lack)
+        lack = _free_part(p, sub(vec(p.wanted), relative_velocity(p, mover[p.a], mover[p.b])))
         store_vec3(left, k, lack)
         store_vec3(way, k, _free_part(p, _conditioned(p, lack)))
         along += dot(lack, load_vec3(way, k))

@@ -20,7 +20,7 @@ CONTACT_POINT = record(
         ("tangential_mass", "f8"),  # and the smallest across it [kg]
         ("friction", "f8"),
         ("static_friction", "f8"),
-        ("wanted", "f8"),  # normal velocity at least [m/s]
+        ("wanted", "f8", (3,)),  # velocity of b against a, along the normal at least [m/s]
         ("push", "f8"),  # impulse along the normal [N s]
         ("drag", "f8", (3,)),  # and across it
     ]
@@ -45,6 +45,9 @@ CONTACT_TERMS = record(
         ("angular_impulse", "f8", (3,)),  # against rolling [N m s]
         ("force", "f8", (3,)),  # at the end of the step [N]
         ("torque", "f8", (3,)),  # against rolling [N m]
+        ("rubbed", "f8"),  # energy that friction takes [J]
+        ("rolled", "f8"),  # and rolling friction
+        ("work", "f8"),  # that an obstacle does by moving [J]
         ("owner", "i2"),  # whose face the normal turns with: NOBODY, OF_A, OF_B or OF_EDGES
         ("round_a", "i2"),  # whether a body is a sphere
         ("round_b", "i2"),

@@ -31,13 +31,13 @@ from particlesim.model.free_motion import free_rotation
 
 
 @kernel
-def free_state(mover, members, gravity, duration, state):
+def free_state(system, mover, members, gravity, duration, state):
     """Write what becomes of members that nothing pushes."""
     for k in range(len(members)):
-        before = mover[members[k]].before
+        velocity, before = system.body[members[k]].velocity, mover[members[k]].before
         for axis in range(3):
             state[k, axis] = state[k, 3 + axis] = 0.0
-            state[k, 6 + axis] = (before[axis] + 0.5 * gravity[axis] * duration) * duration
+            state[k, 6 + axis] = (velocity[axis] + 0.5 * gravity[axis] * duration) * duration
             state[k, 9 + axis] = before[3 + axis] * duration
 
 
@@ -165,6 +165,15 @@ def pay(members, ahead, gain):
 
 
 @kernel
+def sum_of_work(islands, span):
+    """The work that obstacles do at the contact points of a span (first, last) [J]."""
+    work = 0.0
+    for k in range(span[0], span[1]):
+        work += islands.terms[k].work
+    return work
+
+
+@kernel
 def _add_impulses(members, change, share, ahead):
     """Give members a share of impulses (n, 6)."""
     for k in range(len(members)):
@@ -174,16 +183,16 @@ def _add_impulses(members, change, share, ahead):
 
 
 @kernel
-def add_affordable(system, members, gravity, change, ahead):
-    """Give members so much of impulses (n, 6) that they gain no energy; returns the share, 0 to 1.
+def add_affordable(system, members, gravity, change, works, ahead):
+    """Give members so much of impulses (n, 6) that they gain no energy but by work; returns the share, 0 to 1.
 
-    The energy is quadratic in the share.
+    ``works`` of obstacles [J] are those until now, and of all these impulses. The energy is quadratic in the share.
     """
-    none = gain_ahead(system, members, gravity, ahead)
+    none = gain_ahead(system, members, gravity, ahead) - works[0]
     _add_impulses(members, change, 0.5, ahead)
-    half = gain_ahead(system, members, gravity, ahead)
+    half = gain_ahead(system, members, gravity, ahead) - works[0] - 0.5 * works[1]
     _add_impulses(members, change, 0.5, ahead)
-    whole = gain_ahead(system, members, gravity, ahead)
+    whole = gain_ahead(system, members, gravity, ahead) - works[0] - works[1]
     most, share = max(none, 0.0), 1.0
     if whole > most:
         curvature = 2.0 * (none - 2.0 * half + whole)
@@ -203,14 +212,15 @@ def between(low, high, share, state):
 
 
 @kernel
-def affordable(system, members, gravity, duration, states, rounding):
+def affordable(system, members, gravity, duration, states, work, rounding):
     """How far to go from the first of ``states`` towards the second so that no energy is gained, 0 to 1.
 
-    The third becomes what is reached. On the way from the first, which gains none, energy falls and then rises.
+    But for as much of the ``work`` [J] that obstacles do on the whole way. The third becomes what is reached. On the
+    way from the first, which gains none, energy falls and then rises.
     """
     low, high, state = states
     between(low, high, 1.0, state)
-    of_high = gain_of(system, members, gravity, duration, state)
+    of_high = gain_of(system, members, gravity, duration, state) - work
     if of_high <= rounding:
         return 1.0
     share, far = 0.0, 1.0
@@ -220,7 +230,7 @@ def affordable(system, members, gravity, duration, states, rounding):
         if step > 0 and of_share < 0.0:
             middle = share + 0.99 * (far - share) * of_share / (of_share - of_high)
         between(low, high, middle, state)
-        gain = gain_of(system, members, gravity, duration, state)
+        gain = gain_of(system, members, gravity, duration, state) - middle * work
         if gain <= 0.0:
             share, of_share = middle, gain
         else:
@@ -230,12 +240,12 @@ def affordable(system, members, gravity, duration, states, rounding):
 
 
 @kernel
-def rounding_of_energy(system, mover, members, gravity):
+def rounding_of_energy(system, mover, members):
     """Energies that are rounding among the members of an island [J]."""
     energy = 0.0
     for i in members:
         b, before = system.body[i], mover[i].before
         speed2 = before[0] * before[0] + before[1] * before[1] + before[2] * before[2]
-        energy += b.mass * (norm(gravity) * b.radius + 0.5 * speed2)
+        energy += b.mass * (norm(vec(mover[i].pull)) * b.radius + 0.5 * speed2)
         energy += 0.5 * dot(vec(b.angular_momentum), (before[3], before[4], before[5]))
     return ENERGY_ROUNDING * energy

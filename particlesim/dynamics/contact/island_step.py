@@ -17,10 +17,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from particlesim.core.constants import DISSIPATION
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import (
     add,
     axpy,
+    dot,
     norm,
     scale,
     set_quat,
@@ -29,7 +31,7 @@ from particlesim.core.math3d import (
     to_quat,
 )
 from particlesim.core.math3d import to_vec3 as vec
-from particlesim.dynamics.contact.cone_solver import Sweeps, briefly, give, give_turn, solve
+from particlesim.dynamics.contact.cone_solver import Sweeps, briefly, give, give_turn, relative_velocity, solve
 from particlesim.dynamics.contact.conjugate_ways import new_ways
 from particlesim.dynamics.contact.contact_records import along_normal
 from particlesim.dynamics.contact.island_energy import (
@@ -40,9 +42,21 @@ from particlesim.dynamics.contact.island_energy import (
     pay,
     place_ahead,
     rounding_of_energy,
+    sum_of_work,
     write_state,
 )
-from particlesim.dynamics.contact.movers import change_of, closing, gap_now, write_mover
+from particlesim.dynamics.contact.law import rest_speed
+from particlesim.dynamics.contact.movers import (
+    begin_means,
+    book,
+    change_of,
+    closing,
+    end_means,
+    gap_now,
+    seek,
+    take_back,
+    write_mover,
+)
 from particlesim.dynamics.contact.position_correction import correct_positions
 from particlesim.dynamics.settings import (
     CONJUGATE_SWEEPS,
@@ -58,6 +72,7 @@ from particlesim.dynamics.settings import (
 from particlesim.model.domain import nearest_image
 
 _STILL = (0.0, 0.0, 0.0)
+FRICTION, ROLLING, REST = (DISSIPATION.index(cause) for cause in ("friction", "rolling", "rest"))
 
 
 class Islands(NamedTuple):
@@ -68,17 +83,28 @@ class Islands(NamedTuple):
     terms: np.ndarray  # (m,) CONTACT_TERMS
     first_member: np.ndarray  # (k + 1,) int64
     member: np.ndarray  # (n,) int64, particles
-    lost: np.ndarray  # (k,) energy that the islands lose in the step [J]
+    lost: np.ndarray  # (k, 4) energy that the islands lose in the step, by the causes in DISSIPATION [J]
+    work: np.ndarray  # (k,) and that obstacles give them [J]
 
 
 # ---- substeps ------------------------------------------------------------------------------------------------------
 
 
 @kernel
-def _begin(islands, span, duration):
-    """Let contact points have the impulses of a substep as in the step before."""
+def _begin(system, islands, mover, span, members, interval):
+    """Write the members as the sweeps see them; let contact points have the impulses of a part as in the step before.
+
+    ``interval`` (time, duration): until fields have acted for as long as they have been let to, and of a part [s].
+    """
+    gravity, (time, duration) = vec(system.domain[0].gravity), interval
+    for m in range(len(members)):
+        member = mover[members[m]]
+        write_mover(member, system.body[members[m]], m)
+        take_back(member, scale(sub(vec(member.pull), gravity), time))
     for k in range(span[0], span[1]):
         p, t = islands.points[k], islands.terms[k]
+        t.approach = dot(vec(p.normal), relative_velocity(p, mover[p.a], mover[p.b]))
+        t.threshold = rest_speed(norm(vec(mover[p.a].pull)), t.inradius)
         along, across = along_normal(p, vec(t.force))
         p.push = max(along, 0.0) * duration
         set_vec3(p.drag, scale(across, duration if p.static_friction > 0.0 and p.push > 0.0 else 0.0))
@@ -86,21 +112,23 @@ def _begin(islands, span, duration):
 
 
 @kernel
-def _substep(islands, mover, span, members, fall, interval, sweeps, ways):
+def _substep(system, islands, mover, span, members, interval, sweeps, ways):
     """Take an island through the substep of an interval (time, duration); returns the last change of a velocity."""
     points, terms = islands.points, islands.terms
     time, duration = interval
     parts = False
+    begin_means(mover, members)
     for i in members:
-        set_vec3(mover[i].velocity, add(vec(mover[i].velocity), fall))
+        set_vec3(mover[i].velocity, axpy(vec(mover[i].velocity), vec(mover[i].pull), duration))
     for k in range(span[0], span[1]):
         p, t = points[k], terms[k]
         a, b = mover[p.a], mover[p.b]
-        gap, bent = gap_now(p, t, a, b, time)
+        gap, bent = gap_now(system, p, t, a, b, time)
         # It bends as the square of the time: so much more than until now in this substep.
         bends = -bent * (2.0 * time / duration + 1.0) * duration * duration / (time * time) if bent < 0.0 else 0.0
         room = gap - bends
-        p.wanted, t.parting = -max(room - t.slack, 0.0) / duration, min(max(-room, 0.0), bends) / duration
+        seek(system, p, mover, -max(room - t.slack, 0.0) / duration, time, duration)
+        t.parting = min(max(-room, 0.0), bends) / duration
         parts = parts or t.parting > 0.0
         give(p, a, b, axpy(vec(p.drag), vec(p.normal), p.push))
         if t.rolling_friction > 0.0:
@@ -108,18 +136,21 @@ def _substep(islands, mover, span, members, fall, interval, sweeps, ways):
     left = solve(points, terms, mover, span, members, sweeps, ways)
     if parts:
         for k in range(span[0], span[1]):
-            points[k].wanted += terms[k].parting
+            set_vec3(points[k].wanted, axpy(vec(points[k].wanted), vec(points[k].normal), terms[k].parting))
         # They may have no room to: impulses would grow for as long as they are looked for.
         solve(points, terms, mover, span, members, briefly(sweeps), ways)
     for i in members:
         m = mover[i]
         set_vec3(m.shift, axpy(vec(m.shift), vec(m.velocity), duration))
         set_vec3(m.turn, axpy(vec(m.turn), vec(m.spin), duration))
+    end_means(mover, members)
     for k in range(span[0], span[1]):
         p, t = points[k], terms[k]
+        impulse = axpy(vec(p.drag), vec(p.normal), p.push)
         t.pushed += p.push
-        set_vec3(t.impulse, add(vec(t.impulse), axpy(vec(p.drag), vec(p.normal), p.push)))
+        set_vec3(t.impulse, add(vec(t.impulse), impulse))
         set_vec3(t.angular_impulse, add(vec(t.angular_impulse), vec(t.roll)))
+        book(system, mover, p, t, impulse, vec(t.roll), interval)
     return left
 
 
@@ -133,35 +164,39 @@ def _remember(islands, span, duration):
 
 
 @kernel
-def _rebound(islands, mover, span, members, sweeps, ways):
+def _rebound(system, islands, mover, span, members, time, sweeps, ways):
     """Let points that met fast part as their restitution says; returns whether there are any."""
     anything = False
+    begin_means(mover, members)
     for k in range(span[0], span[1]):
         p, t = islands.points[k], islands.terms[k]
         if t.pushed > 0.0 and t.approach < -t.threshold and t.restitution > 0.0:
-            p.wanted = -t.restitution * t.approach
+            seek(system, p, mover, -t.restitution * t.approach, time, 0.0)
             anything = True
     if anything:
         solve(islands.points, islands.terms, mover, span, members, briefly(sweeps), ways)
+        end_means(mover, members)
     return anything
 
 
 @kernel
-def _add_rebound(islands, span, duration, share):
-    """Add a share of the impulses since ``_remember`` to those of the step."""
+def _add_rebound(system, islands, mover, span, interval, share):
+    """Add a share of the impulses since ``_remember``; ``interval``: how long the step and its parts last [s]."""
+    time, duration = interval
     for k in range(span[0], span[1]):
         p, t = islands.points[k], islands.terms[k]
-        back = axpy(axpy(vec(p.drag), vec(p.normal), p.push), vec(t.force), -duration)
-        set_vec3(t.impulse, axpy(vec(t.impulse), back, share))
-        back = axpy(vec(t.roll), vec(t.torque), -duration)
-        set_vec3(t.angular_impulse, axpy(vec(t.angular_impulse), back, share))
+        impulse = scale(axpy(axpy(vec(p.drag), vec(p.normal), p.push), vec(t.force), -duration), share)
+        turning = scale(axpy(vec(t.roll), vec(t.torque), -duration), share)
+        set_vec3(t.impulse, add(vec(t.impulse), impulse))
+        set_vec3(t.angular_impulse, add(vec(t.angular_impulse), turning))
+        book(system, mover, p, t, impulse, turning, (time, 0.0))
 
 
 # ---- displacements -------------------------------------------------------------------------------------------------
 
 
 @kernel
-def _mean_velocities(islands, mover, span, members, time, duration):
+def _mean_velocities(system, islands, mover, span, members, time, duration):
     """Take half of what became faster in the step, for a substep, back from displacements, where that closes no gap.
 
     Sums of new velocities of substeps become sums of the means of old and new ones.
@@ -177,7 +212,7 @@ def _mean_velocities(islands, mover, span, members, time, duration):
                 continue
             of_a = (_STILL, _STILL) if fixed_a else change_of(a)
             of_b = (_STILL, _STILL) if fixed_b else change_of(b)
-            gap, _ = gap_now(p, t, a, b, time)
+            gap, _ = gap_now(system, p, t, a, b, time)
             if gap - 0.5 * duration * closing(p, of_a, of_b) < min(gap, 0.0) - GAP_ROUNDING * t.inradius:
                 struck[a.row] = more = True
                 if b.row >= 0:
@@ -204,13 +239,28 @@ def _scale_impulses(islands, span, share):
         t = islands.terms[k]
         set_vec3(t.impulse, scale(vec(t.impulse), share))
         set_vec3(t.angular_impulse, scale(vec(t.angular_impulse), share))
+        t.rubbed, t.rolled, t.work = share * t.rubbed, share * t.rolled, share * t.work
 
 
 @kernel
-def _limits(islands, span, fall, part):
+def _book_island(islands, k, span, gain):
+    """Book what an island has lost, that has gained so much [J]: what friction and rolling did not take, rest did."""
+    rubbed = rolled = 0.0
+    for n in range(span[0], span[1]):
+        rubbed += islands.terms[n].rubbed
+        rolled += islands.terms[n].rolled
+    work, lost = sum_of_work(islands, span), islands.lost[k]
+    islands.work[k] = work
+    lost[FRICTION], lost[ROLLING], lost[REST] = rubbed, rolled, work - gain - rubbed - rolled
+
+
+@kernel
+def _limits(islands, mover, span, members, part):
     """How many sweeps the points of a span have in a ``part`` of the step [s], and when they end."""
-    fastest, visits = norm(fall), 2 * RESTING_SUBSTEPS * max(span[1] - span[0], 1)
+    fastest, visits = 0.0, 2 * RESTING_SUBSTEPS * max(span[1] - span[0], 1)
     least = np.inf
+    for i in members:
+        fastest = max(fastest, norm(vec(mover[i].pull)) * part)
     for k in range(span[0], span[1]):
         fastest = max(fastest, abs(islands.terms[k].approach))
         least = min(least, islands.terms[k].inradius)
@@ -221,55 +271,56 @@ def _limits(islands, span, fall, part):
 
 
 @kernel
-def _step_island(system, islands, mover, k, duration, ahead):
-    """Take island ``k`` through a step of ``duration`` [s]; returns as ``step_islands`` does."""
+def _step_island(system, islands, mover, k, interval, ahead):
+    """Take island ``k`` through a step; ``interval`` and what is returned are as in ``step_islands``."""
     span = islands.first_point[k], islands.first_point[k + 1]
     members = islands.member[islands.first_member[k] : islands.first_member[k + 1]]
-    gravity, part = vec(system.domain[0].gravity), duration / RESTING_SUBSTEPS
-    for m in range(len(members)):
-        write_mover(mover[members[m]], system.body[members[m]], m)
-    fall = scale(gravity, part)
-    sweeps = _limits(islands, span, fall, part)
+    gravity, (duration, until_fields) = vec(system.domain[0].gravity), interval
+    part = duration / RESTING_SUBSTEPS
+    _begin(system, islands, mover, span, members, (until_fields, part))
+    sweeps = _limits(islands, mover, span, members, part)
     ways = new_ways(span[1] - span[0], len(members))
-    _begin(islands, span, part)
     left = 0.0
     for substep in range(RESTING_SUBSTEPS):
-        left = _substep(islands, mover, span, members, fall, (substep * part, part), sweeps, ways)
+        left = _substep(system, islands, mover, span, members, (substep * part, part), sweeps, ways)
     _remember(islands, span, part)
-    _mean_velocities(islands, mover, span, members, duration, part)
+    _mean_velocities(system, islands, mover, span, members, duration, part)
     states = np.empty((len(members), 12)), np.empty((len(members), 12)), np.empty((len(members), 12))
-    rounding = rounding_of_energy(system, mover, members, gravity)
-    free_state(mover, members, gravity, duration, states[0])
+    rounding = rounding_of_energy(system, mover, members)
+    free_state(system, mover, members, gravity, duration, states[0])
     write_state(islands, mover, span, members, states[1])
-    share = affordable(system, members, gravity, duration, states, rounding)
+    share = affordable(system, members, gravity, duration, states, sum_of_work(islands, span), rounding)
     if share < 1.0:
         _scale_impulses(islands, span, share)
     place_ahead(system, members, gravity, duration, states[2], ahead)
     held = correct_positions(system, islands, mover, span, ahead, len(members))
-    gain = gain_ahead(system, members, gravity, ahead)
+    work = sum_of_work(islands, span)
+    gain = gain_ahead(system, members, gravity, ahead) - work
     if gain > rounding:
         pay(members, ahead, gain)
     write_state(islands, mover, span, members, states[0])
-    if _rebound(islands, mover, span, members, sweeps, ways):
-        _add_rebound(islands, span, part, 1.0)
+    if _rebound(system, islands, mover, span, members, duration, sweeps, ways):
+        _add_rebound(system, islands, mover, span, (duration, part), 1.0)
         write_state(islands, mover, span, members, states[1])
-        share = add_affordable(system, members, gravity, states[1] - states[0], ahead)
-        _add_rebound(islands, span, part, share - 1.0)
-    islands.lost[k] = -gain_ahead(system, members, gravity, ahead)
+        works = work, sum_of_work(islands, span) - work
+        share = add_affordable(system, members, gravity, states[1] - states[0], works, ahead)
+        _add_rebound(system, islands, mover, span, (duration, part), share - 1.0)
+    _book_island(islands, k, span, gain_ahead(system, members, gravity, ahead))
     return np.inf if held else left
 
 
 @entry_kernel
-def step_islands(system, islands, mover, duration, ahead, first, last):
-    """Take islands ``first .. last`` through a step of ``duration`` [s].
+def step_islands(system, islands, mover, interval, ahead, first, last):
+    """Take islands ``first .. last`` through a step.
 
-    Writes where bodies are in the end, and how they move, into ``ahead`` (n,) BODY, and the impulses. Returns the
-    largest velocity that was still changing [m/s], infinity if some bodies were held back.
+    ``interval``: how long it is, and until fields have acted for as long as they have been let to [s]. Writes where
+    bodies are in the end, and how they move, into ``ahead`` (n,) BODY, and the impulses. Returns the largest velocity
+    that was still changing [m/s], infinity if some bodies were held back.
     """
     system, islands, mover, ahead = without_refcounts((system, islands, mover, ahead))
     left = 0.0
     for k in range(first, last):
-        left = max(left, _step_island(system, islands, mover, k, duration, ahead))
+        left = max(left, _step_island(system, islands, mover, k, interval, ahead))
     return left
 
 

@@ -31,7 +31,7 @@ from particlesim.core.math3d import to_vec3 as vec
 from particlesim.dynamics.ccd.conservative_advancement import facing_edge
 from particlesim.dynamics.ccd.time_of_impact import sized_core
 from particlesim.dynamics.contact.contact_records import CONTACT_POINT, CONTACT_TERMS, NOBODY, OF_A, OF_B, OF_EDGES
-from particlesim.dynamics.contact.law import rest_threshold, restitution_of, tangent_of
+from particlesim.dynamics.contact.law import rest_speed, rest_threshold, restitution_of, tangent_of
 from particlesim.dynamics.settings import (
     LEVEL_VERTICES,
     LOSSLESS_REST,
@@ -155,6 +155,18 @@ def _reach_of(system, a, b, displacement):
 
 
 @kernel
+def _displacement(system, motion, i, j):
+    """How far the surfaces of two bodies may move against each other in the step [m]."""
+    a, b, turning = system.body[i], system.body[j], norm(load_vec3(motion.spin, j))
+    speed = motion.speed[i] + motion.speed[j]
+    if j >= system.bounded and turning > 0.0:
+        speed += turning * (
+            norm(nearest_image(sub(vec(a.position), vec(b.position)), system.domain[0].period)) + a.radius
+        )
+    return speed * motion.duration
+
+
+@kernel
 def _turning_slack(system, motion, i, j):
     """How far turning may close a gap that the velocities of now do not show [m].
 
@@ -243,7 +255,8 @@ def _write_point(system, motion, p, terms, pair, arm, offset):
     p.friction, p.static_friction = law.friction, law.static_friction
     if law.static_friction > 0.0:
         p.tangential_mass = _tangential_mass(a, b, arm, arm_b, normal)
-    p.wanted = p.push = 0.0
+    p.push = 0.0
+    set_vec3(p.wanted, (0.0, 0.0, 0.0))
     set_vec3(p.drag, (0.0, 0.0, 0.0))
     terms.inradius = min(a.inradius, b.inradius)
     terms.restitution, terms.threshold = law.restitution, rest_threshold(system, a, b)
@@ -253,7 +266,7 @@ def _write_point(system, motion, p, terms, pair, arm, offset):
     terms.approach = dot(normal, sub(of_b, of_a))
     for vector in (terms.roll, terms.impulse, terms.angular_impulse, terms.force, terms.torque):
         set_vec3(vector, (0.0, 0.0, 0.0))
-    terms.pushed = 0.0
+    terms.pushed = terms.rubbed = terms.rolled = terms.work = 0.0
 
 
 @kernel
@@ -266,8 +279,7 @@ def add_contact(system, motion, pair, clear, room, found, size):
     """
     i, j = pair
     a, b = system.body[i], system.body[j]
-    displacement = (motion.speed[i] + motion.speed[j]) * motion.duration
-    reach, tilt, lossless = _reach_of(system, a, b, displacement)
+    reach, tilt, lossless = _reach_of(system, a, b, _displacement(system, motion, i, j))
     if clear > reach:
         return size, clear, lossless
     normal, offset, count, clear = _pair_points(system, a, b, reach, tilt, room)
@@ -321,31 +333,41 @@ def contacts_of(system, neighbours, motion, search, indices, first, last):
 
 
 @kernel
-def _rests(terms, points, size, gravity):
-    """Whether bodies hardly move against each other at one of these points, and gravity presses them together there."""
+def _rests(terms, points, size, pull, lead):
+    """Whether bodies hardly move against each other at one of these points, and are pulled together there.
+
+    ``lead`` is the velocity that fields have given the first of them ahead of time [m/s].
+    """
     for k in range(size):
-        t = terms[k]
+        t, normal = terms[k], vec(points[k].normal)
         near = RESTITUTION_THRESHOLD_HEIGHT * t.inradius * (LOSSLESS_REST if t.restitution == 1.0 else 1.0)
-        if t.gap <= near and abs(t.approach) <= t.threshold and dot(vec(points[k].normal), gravity) > 0.0:
+        slow = abs(t.approach + dot(normal, lead)) <= rest_speed(norm(pull), t.inradius)
+        if t.gap <= near and slow and dot(normal, pull) > 0.0:
             return True
     return False
 
 
 @entry_kernel
-def resting_on_obstacles(system, neighbours, motion, rests, first, last):
-    """Mark in ``rests`` (n,) those of particles ``first .. last`` that gravity presses against an obstacle."""
+def resting_on_obstacles(system, neighbours, motion, pulled, rests, first, last):
+    """Mark in ``rests`` (n,) those of particles ``first .. last`` that gravity or fields press against an obstacle.
+
+    ``pulled``: accelerations (n, 3) [m/s^2], and for how long fields have acted ahead of time [s].
+    """
     system, neighbours, motion, rests = without_refcounts((system, neighbours, motion, rests))
+    pulls, ahead = pulled
     room = _Room(np.empty((MAX_MANIFOLD, 3)), np.empty(MAX_MANIFOLD))
     points, terms = np.empty(MAX_MANIFOLD, dtype=CONTACT_POINT), np.empty(MAX_MANIFOLD, dtype=CONTACT_TERMS)
     gravity = vec(system.domain[0].gravity)
     for i in range(first, last):
+        pull = load_vec3(pulls, i)
+        lead = scale(sub(pull, gravity), ahead)
         for j in range(system.bounded, len(system.body)):
             if not rests[i]:
                 size, _, _ = add_contact(system, motion, (i, j), -np.inf, room, (points, terms), 0)
-                rests[i] = _rests(terms, points, size, gravity)
+                rests[i] = _rests(terms, points, size, pull, lead)
         place = neighbours.place[i]
         for near in range(neighbours.start[place], neighbours.start[place + 1]):
             j = neighbours.body[neighbours.other[near]]
             if j >= system.particles and not rests[i]:
                 size, _, _ = add_contact(system, motion, (i, j), -np.inf, room, (points, terms), 0)
-                rests[i] = _rests(terms, points, size, gravity)
+                rests[i] = _rests(terms, points, size, pull, lead)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from particlesim.core.constants import DISSIPATION
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import dot, sub
 from particlesim.core.math3d import to_vec3 as vec
@@ -63,8 +64,10 @@ def gathered(points: np.ndarray, terms: np.ndarray, seeds: np.ndarray, particles
     member = member[np.argsort(root[member], kind="stable")]
     starts = np.flatnonzero(np.diff(of_point, prepend=-1))
     first_member = np.searchsorted(root[member], of_point[starts])
-    first_point, lost = np.append(starts, len(points)), np.zeros(len(starts))
-    return Islands(first_point, points, terms, np.append(first_member, len(member)), member, lost)
+    first_point, lost = np.append(starts, len(points)), np.zeros((len(starts), len(DISSIPATION)))
+    return Islands(
+        first_point, points, terms, np.append(first_member, len(member)), member, lost, np.zeros(len(starts))
+    )
 
 
 @entry_kernel
@@ -100,6 +103,27 @@ def warm_start(islands: Islands, forces: np.ndarray, bodies: int) -> None:
     # The points of a contact stand in a row.
     begin = order[np.minimum(first, len(order) - 1)] if len(order) else first
     _hand_down(islands.points, islands.terms, begin, begin + (last - first), forces)
+
+
+def forces_of(forces: np.ndarray, origin: np.ndarray, before: int, now: int) -> np.ndarray:
+    """The ``forces`` (k,) FORCE of contacts whose bodies are still there, where particles come and go.
+
+    Parameters
+    ----------
+    origin : (n,) int
+        Which of the particles before each of them was, -1 for new ones.
+    before, now : int
+        How many bodies there were, and are. Obstacles stay.
+    """
+    obstacles = now - len(origin)
+    place = np.full(before, -1)
+    place[origin[origin >= 0]] = np.flatnonzero(origin >= 0)
+    place[before - obstacles :] = np.arange(len(origin), now)
+    a, b = place[forces["contact"] // before], place[forces["contact"] % before]
+    stays = (a >= 0) & (a < b)
+    kept = forces[stays]
+    kept["contact"] = (a * now + b)[stays]
+    return kept
 
 
 def forces_after(islands: Islands, bodies: int) -> np.ndarray:

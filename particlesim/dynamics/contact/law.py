@@ -31,10 +31,15 @@ def surface_velocity(system, b, normal):
 
 
 @kernel
+def rest_speed(acceleration, inradius):
+    """Normal speed below which impacts under an acceleration end in rest (see RESTITUTION_THRESHOLD_HEIGHT) [m/s]."""
+    return math.sqrt(2.0 * acceleration * RESTITUTION_THRESHOLD_HEIGHT * inradius)
+
+
+@kernel
 def rest_threshold(system, a, b):
-    """Normal speed below which an impact under gravity ends in rest (see RESTITUTION_THRESHOLD_HEIGHT) [m/s]."""
-    gravity = norm(to_vec3(system.domain[0].gravity))
-    return math.sqrt(2.0 * gravity * RESTITUTION_THRESHOLD_HEIGHT * min(a.inradius, b.inradius))
+    """Normal speed below which an impact of two bodies under gravity ends in rest [m/s]."""
+    return rest_speed(norm(to_vec3(system.domain[0].gravity)), min(a.inradius, b.inradius))
 
 
 @kernel

@@ -5,9 +5,11 @@ from __future__ import annotations
 from particlesim.core.jit import kernel
 from particlesim.core.math3d import add, axpy, cross, dot, scale, set_vec3, sub, to_quat
 from particlesim.core.math3d import to_vec3 as vec
-from particlesim.dynamics.contact.contact_records import OF_A, OF_B, OF_EDGES
+from particlesim.dynamics.contact.contact_records import OF_A, OF_B, OF_EDGES, along_normal
+from particlesim.dynamics.contact.law import surface_velocity
 from particlesim.dynamics.settings import SMALL_TURN
-from particlesim.model.bodies import angular_velocity
+from particlesim.model.bodies import KINEMATIC, angular_velocity
+from particlesim.model.prescribed_motion import swing_of, swing_shift
 
 _STILL = (0.0, 0.0, 0.0)
 
@@ -45,7 +47,16 @@ def write_mover(m, b, row):
         m.inverse_inertia[k] = inverse[k]
     for axis in range(3):
         m.before[axis], m.before[3 + axis] = velocity[axis], spin[axis]
+        m.mean[axis], m.mean[3 + axis] = velocity[axis], spin[axis]
         m.shift[axis] = m.turn[axis] = 0.0
+
+
+@kernel
+def take_back(m, lead):
+    """Take back a velocity that fields have given a mover ahead of time."""
+    set_vec3(m.velocity, sub(vec(m.velocity), lead))
+    for axis in range(3):
+        m.before[axis] -= lead[axis]
 
 
 @kernel
@@ -89,15 +100,110 @@ def _across_edges(p, t, turn_a, turn_b):
     return add(normal, axpy(change, vec(t.with_b), dot(cross(turn_b, normal), vec(t.edge_b))))
 
 
+# ---- moving obstacles ------------------------------------------------------------------------------------------------
+
+
 @kernel
-def gap_now(p, t, a, b, time):
+def moves(system, i):
+    """Whether a body is an obstacle with a prescribed motion, or whose surface runs."""
+    return system.body[i].kind == KINEMATIC
+
+
+@kernel
+def obstacle_shift(system, i, time):
+    """How far an obstacle goes in a time [s] from the start of the step, and how much faster it then is than there."""
+    b = system.body[i]
+    shift = scale(vec(b.velocity), time)
+    if not moves(system, i):
+        return shift, _STILL
+    swung, faster = swing_shift(swing_of(system.motion[b.motion]), time)
+    return add(shift, swung), faster
+
+
+@kernel
+def surface_gain(system, p, b, shift_a, time):
+    """How much faster the surface of obstacle ``b`` goes at a contact point, a time [s] later, than the mover does.
+
+    The point goes along with particle ``a``, which is shifted by then; a conveyor's surface runs.
+    """
+    shift, faster = obstacle_shift(system, p.b, time)
+    carried = cross(vec(b.spin), sub(shift_a, shift))
+    return add(add(faster, carried), surface_velocity(system, system.body[p.b], vec(p.normal)))
+
+
+@kernel
+def seek(system, p, mover, closing_speed, time, duration):
+    """Let a contact point seek a normal velocity, and no sliding, at the end of a part (time, duration) of the step."""
+    wanted = scale(vec(p.normal), closing_speed)
+    if moves(system, p.b):
+        a, b = mover[p.a], mover[p.b]
+        shift_a = axpy(vec(a.shift), (a.mean[0], a.mean[1], a.mean[2]), duration)
+        wanted = sub(wanted, surface_gain(system, p, b, shift_a, time + duration))
+    set_vec3(p.wanted, wanted)
+
+
+# ---- what impulses take ----------------------------------------------------------------------------------------------
+
+
+@kernel
+def begin_means(mover, members):
+    """Remember the velocities of members as a part of the step begins."""
+    for i in members:
+        m = mover[i]
+        for axis in range(3):
+            m.mean[axis], m.mean[3 + axis] = m.velocity[axis], m.spin[axis]
+
+
+@kernel
+def end_means(mover, members):
+    """Write the means of the velocities that members began a part of the step with, and have now."""
+    for i in members:
+        m = mover[i]
+        for axis in range(3):
+            m.mean[axis] = 0.5 * (m.mean[axis] + m.velocity[axis])
+            m.mean[3 + axis] = 0.5 * (m.mean[3 + axis] + m.spin[axis])
+
+
+@kernel
+def _mean_at(m, arm):
+    """The mean velocity of a mover at an arm from its position."""
+    return add((m.mean[0], m.mean[1], m.mean[2]), cross((m.mean[3], m.mean[4], m.mean[5]), arm))
+
+
+@kernel
+def book(system, mover, p, t, impulse, angular_impulse, interval):
+    """Book what an impulse and one against rolling took in an interval (time, duration), and an obstacle's work.
+
+    An impulse works as much as it would on what goes at the mean of old and new velocities.
+    """
+    a, b = mover[p.a], mover[p.b]
+    of_b = _mean_at(b, vec(p.arm_b))
+    if moves(system, p.b):
+        time, duration = interval
+        then = surface_gain(system, p, b, vec(a.shift), time + duration)
+        earlier = surface_gain(system, p, b, axpy(vec(a.shift), vec(a.velocity), -duration), time)
+        of_b = axpy(of_b, add(earlier, then), 0.5)
+        t.work -= dot(impulse, of_b) + dot(angular_impulse, vec(b.spin))
+    if p.static_friction > 0.0:
+        _, drag = along_normal(p, impulse)
+        t.rubbed -= dot(drag, sub(of_b, _mean_at(a, vec(p.arm_a))))
+    if t.rolling_friction > 0.0:
+        turning = sub((b.mean[3], b.mean[4], b.mean[5]), (a.mean[3], a.mean[4], a.mean[5]))
+        t.rolled -= dot(angular_impulse, turning)
+
+
+# ---- gaps ------------------------------------------------------------------------------------------------------------
+
+
+@kernel
+def gap_now(system, p, t, a, b, time):
     """The gap at a contact point after the displacements of two movers in a time [s] since the start [m].
 
     Returns how much of it there is because bodies have turned, too: the normal with the face that it belongs to.
     """
     shift_b, turn_b = vec(b.shift), vec(b.turn)
     if b.row < 0:
-        shift_b, turn_b = scale(vec(b.velocity), time), scale(vec(b.spin), time)
+        shift_b, turn_b = obstacle_shift(system, p.b, time)[0], scale(vec(b.spin), time)
     straight = t.gap + closing(p, (vec(a.shift), vec(a.turn)), (shift_b, turn_b))
     if dot(vec(a.turn), vec(a.turn)) + dot(turn_b, turn_b) < SMALL_TURN * SMALL_TURN:
         return straight, 0.0

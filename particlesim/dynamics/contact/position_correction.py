@@ -33,7 +33,7 @@ from particlesim.core.math3d import (
 )
 from particlesim.core.math3d import to_vec3 as vec
 from particlesim.dynamics.contact.cone_solver import turned_by
-from particlesim.dynamics.contact.contact import inverse_mass_at, normal_velocity_at
+from particlesim.dynamics.contact.contact import inverse_mass_at, normal_velocity_at, work_of_obstacle
 from particlesim.dynamics.settings import (
     CORRECTED_DEPTH,
     CORRECTION_ROUNDS,
@@ -43,8 +43,8 @@ from particlesim.dynamics.settings import (
     TIMES_HELD_BACK,
 )
 from particlesim.geometry.narrow_phase.pair import pair_contact
-from particlesim.geometry.support import is_half_space, is_sphere
-from particlesim.model.bodies import placed
+from particlesim.geometry.support import is_sphere
+from particlesim.model.bodies import KINEMATIC, placed
 from particlesim.model.domain import nearest_image
 from particlesim.model.free_motion import path_of_body, place_on_path, set_pose
 
@@ -101,10 +101,11 @@ def _travel(system, ahead, i):
     """How far a body goes in the step, and the surface of what is no sphere by turning at most [m]."""
     b, then = system.body[i], ahead[i]
     shift = sub(vec(then.position), vec(b.position))
-    if is_half_space(system.shapes, b.shape_row) or is_sphere(system.shapes, b.shape_row):
+    if is_sphere(system.shapes, b.shape_row):
         return shift, 0.0
     half = quat_multiply(to_quat(then.orientation), conjugate(to_quat(b.orientation)))
-    return shift, 2.0 * b.radius * norm((half[1], half[2], half[3]))
+    sine = norm((half[1], half[2], half[3]))
+    return shift, 2.0 * b.radius * sine if sine > 0.0 else 0.0
 
 
 @kernel
@@ -178,7 +179,7 @@ def _hold_back(b, then, share):
 
 @kernel
 def _collide(ahead, pair, touch, terms):
-    """Let two bodies go on approaching no more where they touch ahead; what b got is added to the ``terms``."""
+    """Let two bodies approach no more where they touch ahead; what b got, and works, is added to the ``terms``."""
     _, normal, offset, arm_a = touch
     a, b = ahead[pair.a], ahead[pair.b]
     arm_b = sub(arm_a, offset)
@@ -189,6 +190,8 @@ def _collide(ahead, pair, touch, terms):
         _strike(a, arm_a, scale(impulse, -1.0))
         if b.inverse_mass > 0.0:
             _strike(b, arm_b, impulse)
+        elif b.kind == KINEMATIC:
+            terms.work += work_of_obstacle(b, impulse, cross(arm_b, impulse))
         set_vec3(terms.impulse, add(vec(terms.impulse), impulse))
 
 

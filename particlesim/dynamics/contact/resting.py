@@ -8,11 +8,11 @@ it, is taken together for a whole step (see island_step.py).
 from __future__ import annotations
 
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
 from particlesim.core.parallel import ThreadTeam
+from particlesim.dynamics.contact.booking import NOTHING_BORNE, Borne
 from particlesim.dynamics.contact.clearance import add_displacements, expected_speeds, surface_speeds
 from particlesim.dynamics.contact.cone_solver import MOVER
 from particlesim.dynamics.contact.island_step import (
@@ -27,9 +27,11 @@ from particlesim.dynamics.contact.lasting_islands import forces_after, gathered,
 from particlesim.dynamics.contact.position_correction import place_obstacles_ahead
 from particlesim.dynamics.neighbour_list import NeighbourList
 from particlesim.dynamics.settings import (
+    CORRECTED_DEPTH,
     LASTING_STEP,
     MAX_CONTACT_SEARCHES,
     PAIR_COST,
+    RESTING_SUBSTEPS,
     SPEED_GAIN,
     SPEED_MARGIN,
     UNRESOLVED_VELOCITY,
@@ -40,35 +42,33 @@ from particlesim.model.bodies import angular_velocities
 from particlesim.model.system import System
 
 
-class Borne(NamedTuple):
-    """What lasting contacts bore in a step."""
-
-    wall_impulse: np.ndarray  # (6,) [N s]
-    wall_shear: np.ndarray  # (6, 3) [N s]
-    virial: float  # [J s]
-    lost: float  # energy [J]
-    unresolved: bool  # whether the bound on the work was reached
-
-
-NOTHING_BORNE = Borne(np.zeros(6), np.zeros((6, 3)), 0.0, 0.0, False)
-
-
 class RestingContacts:
     """Carries what is in lasting contact, changing the records of the bodies and a ``state`` in place."""
 
     def __init__(self, system: System) -> None:
         self._system = system
-        self._gravity = float(np.linalg.norm(system.domain[0]["gravity"]))
+        self._pull = float(np.linalg.norm(system.domain[0]["gravity"]))  # the largest [m/s^2]
         self.loses = bool(system.law["restitution"].min(initial=1.0) < 1.0)
-        self.known = self._gravity > 0.0 or self.loses
+        self.known = self._pull > 0.0 or self.loses
         self._mover = np.zeros(len(system.body) if self.known else 0, dtype=MOVER)
+        self._mover["pull"] = system.domain[0]["gravity"]
+        self._fields_until = 0.0
+        self._inradius = float(system.body["inradius"][: system.particles].min(initial=np.inf))  # the smallest [m]
         self._ahead = np.zeros_like(self._system.body[: len(self._mover)])  # scratch: at the end of the step
         self._member = np.empty(0, dtype=np.int64)
         self._before = system.body[:0]
 
-    def longest_substep(self, state: SolverState) -> float:
-        """How long a substep may be [s] with what is in lasting contact, or soon may be."""
-        return LASTING_STEP if self.loses and (self._gravity > 0.0 or state.lasting.any()) else np.inf
+    def longest_substep(self, state: SolverState, fields: bool) -> float:
+        """How long a substep may be [s] with what is in lasting contact, or soon may be; whether there are fields."""
+        return LASTING_STEP if self.loses and (self._pull > 0.0 or fields or state.lasting.any()) else np.inf
+
+    def let_fields_act(self, acceleration: np.ndarray, until: float) -> None:
+        """Say what fields do to particles (n, 3) [m/s^2], and until when the velocities have it [s]."""
+        if self.known:
+            pulls = self._system.domain[0]["gravity"] + acceleration
+            self._mover["pull"][: len(pulls)] = pulls
+            self._pull = float(np.linalg.norm(pulls, axis=1).max(initial=0.0))
+            self._fields_until = until
 
     def carry(self, state: SolverState, duration: float) -> Borne:
         """Carry what is in lasting contact through a substep of ``duration`` [s]: its velocity changes."""
@@ -79,9 +79,9 @@ class RestingContacts:
         system, body, neighbours = self._system, self._system.body, state.neighbours
         body["resting"][: system.particles] = 0
         spin = angular_velocities(body, len(body))
-        gain = SPEED_GAIN * self._gravity * duration
-        speed = expected_speeds(surface_speeds(body, spin, system.bounded), neighbours, gain)
-        seeds = self._seeds(state, Motion(spin, speed, duration))
+        gain = SPEED_GAIN * self._pull * duration
+        speed = expected_speeds(surface_speeds(system, spin, duration), neighbours, gain)
+        seeds = self._seeds(state, Motion(spin, speed, duration), self._fields_until - state.time)
         if not len(seeds):
             return NOTHING_BORNE
         add_displacements(system, state.seen, state.displacement)
@@ -92,26 +92,28 @@ class RestingContacts:
             points, terms, loose = self._contacts(state, motion, seeds)
             islands = gathered(points, terms, seeds, system.particles)
             warm_start(islands, state.forces, len(body))
-            left = self._step(islands, duration)
-            reached = surface_speeds(body, angular_velocities(body, len(body)), system.bounded)
+            left = self._step(islands, duration, self._fields_until - state.time)
+            reached = surface_speeds(system, angular_velocities(body, len(body)), duration)
             foreseen = bool((reached <= SPEED_MARGIN * speed).all())
             if foreseen or search == MAX_CONTACT_SEARCHES:
                 break
             np.maximum(speed, SPEED_MARGIN * reached, out=speed)
             self.release()
         state.standing[islands.member] = np.where(loose[islands.member] > 0, LOOSE, SETTLES)
+        state.standing[system.particles :] = SETTLES
         state.forces = forces_after(islands, len(body))
         self._mark_lasting(state, islands)
-        scale = max(self._gravity * duration, 1e-300)
-        return self._borne(islands, not foreseen or left > UNRESOLVED_VELOCITY * scale)
+        # What is less does not sink in by more than is corrected.
+        counts = max(self._pull * duration, CORRECTED_DEPTH * self._inradius * RESTING_SUBSTEPS / duration)
+        return self._borne(islands, not foreseen or left > UNRESOLVED_VELOCITY * counts)
 
-    def _seeds(self, state: SolverState, motion: Motion) -> np.ndarray:
+    def _seeds(self, state: SolverState, motion: Motion, until_fields: float) -> np.ndarray:
         """Particles that are in lasting contact to begin with, (k,)."""
-        system = self._system
+        system, near, pulled = self._system, state.neighbours, (self._mover["pull"], until_fields)
         rests = state.lasting.astype(np.bool_)
-        if self._gravity > 0.0:
+        if self._pull > 0.0:
             ThreadTeam(system.particles).each(
-                lambda _, first, last: resting_on_obstacles(system, state.neighbours, motion, rests, first, last),
+                lambda _, first, last: resting_on_obstacles(system, near, motion, pulled, rests, first, last),
                 system.particles,
             )
         return np.flatnonzero(rests)
@@ -149,12 +151,12 @@ class RestingContacts:
     ) -> tuple[np.ndarray, np.ndarray]:
         return contacts_of(self._system, neighbours, motion, search, indices, first, last)
 
-    def _step(self, islands: Islands, duration: float) -> float:
+    def _step(self, islands: Islands, duration: float, until_fields: float) -> float:
         """Take islands through a step; the largest velocity that their last sweeps changed anything by [m/s]."""
-        system = self._system
+        system, interval = self._system, (duration, until_fields)
         team = ThreadTeam(PAIR_COST * len(islands.points))
         left = team.each(
-            lambda _, first, last: step_islands(system, islands, self._mover, duration, self._ahead, first, last),
+            lambda _, first, last: step_islands(system, islands, self._mover, interval, self._ahead, first, last),
             len(islands.first_point) - 1,
             4 * team.threads,
         )
@@ -202,7 +204,8 @@ class RestingContacts:
             np.bincount(wall[on_wall], along[on_wall], minlength=6),
             shear,
             float(((points["arm_a"] - points["arm_b"]) * impulse)[on_particle].sum()),
-            float(islands.lost.sum()),
+            islands.lost.sum(axis=0),
+            float(islands.work.sum()),
             unresolved,
         )
 
