@@ -132,7 +132,7 @@ def sum_speeds(system, block_size, sums, first, last):
 
 
 def typical_speeds(system: System) -> tuple[float, float, float]:
-    """Of particles, in radii: speed of surfaces (root mean square) [1/s], gravity [1/s^2]; and the largest speed [m/s]."""
+    """Of particles: speed of surfaces (root mean square) and gravity in radii [1/s, 1/s^2]; the largest speed [m/s]."""
     sums = np.empty((-(-system.particles // SUM_BLOCK), 2))
     of_blocks = ThreadTeam(system.particles).each(
         lambda _, first, last: sum_speeds(system, SUM_BLOCK, sums, first, last), len(sums)

@@ -111,7 +111,8 @@ IDLE_SWEEPS = 60
 SHORTER_SWEEPS = 0.7
 
 # Impacts of an island within one substep, for each of its bodies, before the substep is cut; before its bodies are in
-# lasting contact, where impacts lose energy: an infinite sequence of them may have begun; and the same for slow impacts
+# lasting contact, where impacts lose energy: an infinite sequence of them may have begun (moments in which what touches
+# does not approach count as well, which comes again as soon as it turns); and the same for slow impacts
 # of what comes to rest: the next substep takes all their contacts together.
 MAX_IMPACTS = 1000
 FEW_IMPACTS = 16
@@ -137,8 +138,10 @@ LOSSLESS_REST = 1e-6
 # what is struck within it has moved at its new velocity from the start; shorter: more substeps.
 LASTING_STEP = 1.0 / 240.0
 
-# How often bodies of a substep that had too many impacts are put into lasting contact before it is bisected.
+# How often a substep is parted where bodies begin to have too many impacts, which are in lasting contact from then on,
+# before it is bisected; and the smallest part of it that is taken by itself before [1].
 MAX_LASTING_ROUNDS = 4
+LEAST_PART = 1e-6
 
 # Faces and edges inclined by less than this rest on each other along a patch [sine]: about what a face is inclined by
 # when one of its edges lies and the other is a few threshold heights away. And by more than the second they never do,

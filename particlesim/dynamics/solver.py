@@ -45,6 +45,7 @@ from particlesim.dynamics.settings import (
     FEW_IMPACTS,
     ISLAND_COST,
     LASTING_STEP,
+    LEAST_PART,
     MAX_IMPACTS,
     MAX_ISLAND_ROUNDS,
     MAX_LASTING_ROUNDS,
@@ -96,7 +97,7 @@ class Solver:
         self._periodic_room = periodic_room(system)
 
     def change_particles(self, particles: np.ndarray, origin: np.ndarray) -> None:
-        """Let there be other particles from now on.
+        """Let there be other particles from now on; those that stay are held by the forces that they were held by.
 
         Parameters
         ----------
@@ -109,7 +110,6 @@ class Solver:
         self.counts.each = np.where(origin >= 0, np.append(self.counts.each, 0)[origin], 0).astype(np.int64)
         self._take(self.model.with_particles(particles))
         self.state = self._begin(before.time)
-        # What stays goes on from the forces that it is held by.
         if len(before.lasting):
             self.state.lasting = np.append(before.lasting, np.int8(0))[origin]
             self.state.forces = forces_of(before.forces, origin, bodies, len(self._system.body))
@@ -224,8 +224,12 @@ class Solver:
             with self._spent_on("advance"):
                 self._advance(duration)
         elif self._resting.loses and duration <= LASTING_STEP and again < MAX_LASTING_ROUNDS:
-            # What met over and over is in lasting contact from the start.
-            self._substep(duration, bisections, again + 1)
+            # What meets over and over is in lasting contact from then on.
+            often, until = self._often, self._until
+            if until > 0.0:
+                self._substep(until, bisections, again + 1)
+            self.state.lasting[often] = 1
+            self._substep(duration - until, bisections, again + 1)
         else:
             # Too much hangs together, or happens: less does in half the time.
             self._substep(0.5 * duration, bisections + 1, again)
@@ -251,12 +255,12 @@ class Solver:
     def _respond(self, duration: float, anyhow: bool, again: int) -> bool:
         """Carry all that is struck through its impacts; False, with nothing else changed, if it is too much.
 
-        What had too many impacts is then in lasting contact, unless that was tried ``again`` and again.
+        Then it is known what met over and over, and until when it did not, unless that was tried ``again`` and again.
         """
-        system, clock = self._system, self._clock
-        paths = Paths(clock, no_segments())
+        system, clock, state = self._system, self._clock, self.state
+        paths, kept = Paths(clock, no_segments()), (state.forces, state.lasting.copy())
         with self._spent_on("respond"):
-            borne = self._resting.carry(self.state, duration)
+            borne = self._resting.carry(state, duration)
         with self._spent_on("contacts"):
             predicted = self._find_contacts(paths, duration)
         few = self._resting.loses and again < MAX_LASTING_ROUNDS
@@ -270,7 +274,7 @@ class Solver:
                 rewind(paths, system.body, islands.member)
                 self._accumulator[islands.member[islands.start[:-1]]] = 0.0
                 first_segment = len(paths.segment)
-                paths, left = self._run(islands, paths, predicted, duration, FEW_IMPACTS if few else MAX_IMPACTS)
+                paths, left, until = self._run(islands, paths, predicted, duration, FEW_IMPACTS if few else MAX_IMPACTS)
                 unfinished += left
             with self._spent_on("contacts"):
                 linked = self._predict_across(paths, islands.member, first_segment, duration, again=rounds > 0)
@@ -282,11 +286,11 @@ class Solver:
         if done:
             self._book(total, disturbed, borne, unfinished)
         else:
-            often = disturbed[clock["stamp"][disturbed] >= FEW_IMPACTS]
+            self._often = disturbed[clock["stamp"][disturbed] >= FEW_IMPACTS]
+            self._until = until if LEAST_PART * duration < until < duration else 0.0
             rewind(paths, system.body, disturbed)
             self._resting.release()
-            if few and duration <= LASTING_STEP:
-                self.state.lasting[often] = 1
+            state.forces, state.lasting = kept
             forget(clock, system.body, disturbed)
         self._disturbed = disturbed
         return done
@@ -344,8 +348,11 @@ class Solver:
 
     def _run(
         self, islands: Islands, paths: Paths, predicted: Predicted, duration: float, most: int
-    ) -> tuple[Paths, int]:
-        """Carry islands through their impacts, so many a member: the paths, and how many were left unfinished."""
+    ) -> tuple[Paths, int, float]:
+        """Carry islands through their impacts, so many a member.
+
+        Returns the paths, how many islands were left unfinished, and when the first had half of its impacts [s].
+        """
         system, neighbours, count = self._system, self.state.neighbours, len(islands.start) - 1
         team = ThreadTeam(ISLAND_COST * count)
         accumulator, limits = self._accumulator, (most, self._friction)
@@ -356,9 +363,10 @@ class Solver:
             count,
             4 * team.threads,
         )
-        segments = [segments for segments, _ in parts]
+        segments = [segments for segments, _, _ in parts]
         self._segments = with_room(self._segments, len(paths.segment), sum(map(len, segments)))
-        return extended(paths, segments, self._segments), sum(left for _, left in parts)
+        unfinished, until = sum(left for _, left, _ in parts), min(until for _, _, until in parts)
+        return extended(paths, segments, self._segments), unfinished, until
 
     def _predict_across(
         self, paths: Paths, members: np.ndarray, first_segment: int, duration: float, again: bool

@@ -279,17 +279,18 @@ def _run_island(system, clock, neighbours, members, bounds, queue, moment, segme
 
     ``bounds`` are the end of the substep [s], and how many moments of impact there may be for each of the members.
     ``segments`` are (room for them, how many there are, the accumulator). Returns the room, how many there are then,
-    and whether impacts were left.
+    and when half of the moments were used up if all were, infinity if no impacts were left [s].
     """
     segment, used, accumulator = segments
     duration, most = bounds
     left, budget = most * len(members), MAX_SLOW_IMPACTS * len(members)
-    time = 0.0
+    half, time, halfway = left // 2, 0.0, 0.0
     while left > 0:
         time, count, size = _pop_simultaneous(system, clock, queue, SIMULTANEOUS * duration, moment)
         if count == 0:
-            return segment, used, False
+            return segment, used, math.inf
         left -= 1
+        halfway = time if left == half else halfway
         while used + 2 * size > len(segment):
             segment = grow_records(segment)
         outcome, written, used, budget = _resolve_moment(
@@ -303,7 +304,7 @@ def _run_island(system, clock, neighbours, members, bounds, queue, moment, segme
                     _predict(system, clock, neighbours, moment, m, (soonest, duration), queue)
     while used + 2 * len(members) > len(segment):
         segment = grow_records(segment)
-    return segment, _freeze(system, clock, members, (time, duration), (segment, used)), True
+    return segment, _freeze(system, clock, members, (time, duration), (segment, used)), halfway
 
 
 @entry_kernel
@@ -312,8 +313,8 @@ def run_islands(system, clock, neighbours, predicted, islands, duration, accumul
 
     A ``block`` is (first and last island, moments of impact a member at most, contact laws if there is friction);
     ``predicted`` are the impacts on the paths of the start. Adds to the row of ``accumulator`` (n, columns as in
-    booking.py) of each island's first member. Returns the path segments, and how many islands were left with impacts to
-    resolve.
+    booking.py) of each island's first member. Returns the path segments, how many islands were left with impacts to
+    resolve, and when the first of them had half of its moments, or infinity [s].
     """
     system, clock, neighbours, predicted, islands, accumulator = without_refcounts(
         (system, clock, neighbours, predicted, islands, accumulator)
@@ -321,6 +322,7 @@ def run_islands(system, clock, neighbours, predicted, islands, duration, accumul
     moment = new_moment(block[3])
     segment = np.empty(256, dtype=SEGMENT)
     used = unfinished = 0
+    first_half = math.inf
     queue = [(0.0, 0, 0, 0)]
     for k in range(block[0], block[1]):
         queue.clear()
@@ -335,6 +337,7 @@ def run_islands(system, clock, neighbours, predicted, islands, duration, accumul
                 continue
         _begin(predicted, clock, members, queue)
         segments, bounds = (segment, used, accumulator[members[0]]), (duration, block[2])
-        segment, used, left = _run_island(system, clock, neighbours, members, bounds, queue, moment, segments)
-        unfinished += left
-    return segment[:used], unfinished
+        segment, used, halfway = _run_island(system, clock, neighbours, members, bounds, queue, moment, segments)
+        unfinished += halfway < math.inf
+        first_half = min(first_half, halfway)
+    return segment[:used], unfinished, first_half
