@@ -45,6 +45,35 @@ for _ in range(200):
 print("done")
 """
 
+# LLVM hands over what it has compiled, as the signal arrives: the code is kept all the same.
+COMPILED = """
+import os, signal
+import numba
+from numba.core.codegen import CPUCodeLibrary
+from particlesim.core import interrupts
+
+take, struck = CPUCodeLibrary._object_compiled_hook, []
+
+def interrupted(*compiled):
+    if not struck:
+        struck.append(True)
+        os.kill(os.getpid(), signal.SIGTERM)
+    take(*compiled)
+
+CPUCodeLibrary._object_compiled_hook = interrupted
+interrupts.raise_signals()
+
+@numba.njit(cache=True)
+def add(a, b):
+    return a + b
+
+try:
+    print(add(1, 2))
+except interrupts.Interrupted:
+    print("interrupted")
+print(add(1, 2))
+"""
+
 
 @pytest.fixture
 def signals():
@@ -59,6 +88,14 @@ def signals():
 def test_an_interruption_amid_kernels_is_one():
     done = subprocess.run([sys.executable, "-c", KERNEL], capture_output=True, text=True, check=False, timeout=60)
     assert (done.stdout, done.stderr, done.returncode) == ("done\n", "", 0)
+
+
+def test_an_interruption_amid_compiling_is_one_and_loses_no_code(tmp_path):
+    (tmp_path / "program.py").write_text(COMPILED)
+    command = [sys.executable, str(tmp_path / "program.py")]
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=100, env=environment)
+    assert (done.stdout, done.stderr, done.returncode) == ("interrupted\n3\n", "", 0)
 
 
 def test_signals_that_follow_at_once_do_not_disturb_the_cleaning_up(signals):

@@ -44,15 +44,20 @@ def raise_signals() -> None:
 
 
 def _waiting_for_results(frame: FrameType | None) -> FrameType | None:
-    """The frame that called a kernel if numba is making Python objects of what it returns, else None.
+    """The frame that called what was written in C and calls Python from there, without looking for exceptions; or None.
 
-    It runs Python for named tuples and for types that it has not met, and goes on without looking for exceptions:
-    one raised there ends in a SystemError or in a crash of the interpreter.
+    Numba makes Python objects of what a kernel returns: named tuples, and types that it has not met. One raised there
+    ends in a SystemError or in a crash of the interpreter. LLVM hands over what it has compiled; one raised there is
+    lost, and the machine code with it.
     """
     caller = None
     while frame is not None:
         module = str(frame.f_globals.get("__name__"))
-        if module.startswith("namedtuple_") or module == "numba.core.serialize":
+        if (
+            module.startswith("namedtuple_")
+            or module == "numba.core.serialize"
+            or frame.f_code.co_name.startswith("_raw_object_cache_")
+        ):
             caller = frame.f_back
         frame = frame.f_back
     return caller
