@@ -102,7 +102,7 @@ def test_wrong_input_is_one_line(arguments, line, tmp_path, monkeypatch):
 
 
 def test_too_many_particles_are_refused_at_once(monkeypatch):
-    monkeypatch.setattr("particlesim.setup.build._memory", lambda: 1e6)
+    monkeypatch.setattr("particlesim.setup.memory._memory", lambda: 1e6)
     result = run("--quiet")
     assert result.exit_code == 2
     assert "100,000 particles need about" in result.output

@@ -185,7 +185,7 @@ def test_the_doctor_ends_with_the_fix_on_a_line_of_its_own(monkeypatch):
 )
 @pytest.mark.parametrize(("command", "phase"), [("simulate", "simulating"), ("render", "rendering")])
 def test_a_signal_ends_with_one_line_and_nothing_half_written(folder, command, phase, number, code, word):
-    (folder / "scene.toml").write_text(SCENE.replace("duration = 0.1", "duration = 1e6"))
+    (folder / "scene.toml").write_text(SCENE.replace("duration = 0.1", "duration = 1e4"))
     child = subprocess.Popen(
         [sys.executable, "-m", "particlesim", command, "scene.toml"],
         stdout=subprocess.PIPE,

@@ -65,12 +65,59 @@ def test_a_good_path_is_let_through_and_nothing_is_left(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["old.mp4"]
 
 
-def test_the_command_refuses_before_it_loads_what_the_work_needs(tmp_path):
-    (tmp_path / "a.toml").write_text("")
-    code = (
-        "import sys\nfrom particlesim.cli.main import main\n"
-        "sys.argv = ['particlesim', 'render', 'a.toml', '-o', 'z.gif']\n"
-        "try:\n    main()\nfinally:\n    print(sorted({'numba', 'gsd', 'scipy', 'trimesh'} & set(sys.modules)))\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (2, "[]\n", "z.gif: the output must end in .mp4\n")
+GROUP = "[world]\nsize = [4, 4, 4]\n[[particles]]\nshape = %s\ncount = %s\nsize = 0.01\n"
+MESH = '{ kind = "mesh", file = "../m.%s" }'
+TRILLION = "particles[0].count = 1000000000000: must be a whole number from 0 to 100,000,000"
+
+
+@pytest.mark.parametrize(
+    ("scene", "arguments", "line"),
+    [
+        ("", ["-o", "z.gif"], "z.gif: the output must end in .mp4"),
+        (GROUP % ('"sphere"', 10**12), [], f"a.toml: {TRILLION}"),
+        (
+            "duration = 100\n" + GROUP % ('"sphere"', 10**8),
+            ["-o", "z.mp4"],
+            "a.toml: particles: 100,000,000 particles need about 100 GB of memory; there are 1 GB",
+        ),
+        (
+            "duration = 1e5\n[movie]\nresolution = [4000, 4000]\n" + GROUP % ('"sphere"', 1),
+            ["-o", "z.mp4"],
+            "z.mp4: takes 98.9 GB on the disk, of which 1.0 GB are free: "
+            "fewer frames or particles, smaller pictures, or another folder",
+        ),
+        (
+            GROUP % (MESH % "off", 1),
+            [],
+            'a.toml: particles[0].shape.file = "../m.off": must be an STL, OBJ or PLY file',
+        ),
+        (
+            GROUP % (MESH % "stl", 1),
+            [],
+            'a.toml: particles[0].shape.file = "../m.stl": has 500 MB: a mesh file has 100 MB at most: '
+            "of a mesh only the convex hull matters",
+        ),
+    ],
+)
+def test_the_command_refuses_before_it_loads_what_the_work_needs(tmp_path, scene, arguments, line):
+    """On a machine with a gigabyte of each."""
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in/a.toml").write_text(scene)
+    (tmp_path / "m.off").touch()
+    with (tmp_path / "m.stl").open("wb") as file:
+        file.truncate(500_000_000)
+    code = f"""
+import os, shutil, sys
+from particlesim.cli.main import main
+os.sysconf = lambda name: 31623
+shutil.disk_usage = lambda path: shutil._ntuple_diskusage(10**12, 0, 10**9)
+sys.argv = ["particlesim", "render", "a.toml", *{arguments}]
+try:
+    main()
+finally:
+    print(sorted({{"numba", "gsd", "scipy", "trimesh"}} & set(sys.modules)))
+"""
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path / "in", check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (2, "[]\n", line + "\n")
+    assert sorted(path.name for path in (tmp_path / "in").iterdir()) == ["a.toml"]

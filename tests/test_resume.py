@@ -12,8 +12,9 @@ from typer.testing import CliRunner
 import particlesim as ps
 from particlesim.cli import main as cli
 from particlesim.core.interrupts import Interrupted
+from particlesim.core.output_path import partial_folder
 from particlesim.jobs import partial_run
-from particlesim.jobs.partial_run import PartialRunError, folder_of
+from particlesim.jobs.partial_run import PartialRunError
 from particlesim.rendering import RenderError
 from particlesim.rendering.video import segments
 from tests import killed
@@ -105,7 +106,7 @@ def left(path, frames=10, **settings):
     """Leave a partial run."""
     with pytest.raises(KeyboardInterrupt):
         ps.simulate(some(**settings), path, progress=stopped(frames))
-    return folder_of(path)
+    return partial_folder(path)
 
 
 def test_what_is_there_is_neither_overwritten_nor_gone_on_with_in_silence(tmp_path, always):
@@ -136,8 +137,8 @@ def test_what_ended_before_anything_was_kept_leaves_nothing(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         ps.simulate(some(), tmp_path / "run.gsd", progress=stopped(3))
     assert not list(tmp_path.iterdir())
-    folder_of(tmp_path / "run.gsd").mkdir()
-    (folder_of(tmp_path / "run.gsd") / "trajectory.gsd").write_text("torn")
+    partial_folder(tmp_path / "run.gsd").mkdir()
+    (partial_folder(tmp_path / "run.gsd") / "trajectory.gsd").write_text("torn")
     ps.simulate(some(), tmp_path / "run.gsd")
     assert [file.name for file in tmp_path.iterdir()] == ["run.gsd"]
 
@@ -145,7 +146,7 @@ def test_what_ended_before_anything_was_kept_leaves_nothing(tmp_path):
 def test_a_folder_that_is_gone_is_not_said_to_be_kept(tmp_path, always):
     def take_away(phase, done, total):
         if done == 9:
-            shutil.rmtree(folder_of(tmp_path / "run.gsd"))
+            shutil.rmtree(partial_folder(tmp_path / "run.gsd"))
 
     with pytest.raises(FileNotFoundError, match="there is no folder") as error:
         ps.simulate(some(), tmp_path / "run.gsd", progress=take_away)

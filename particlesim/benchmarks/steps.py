@@ -23,7 +23,7 @@ import numba
 from particlesim.core.atomic_write import atomic_write
 from particlesim.core.parallel import available_threads, use_threads
 from particlesim.scene import Scene
-from particlesim.setup.build import check_memory
+from particlesim.setup.memory import check_memory
 from particlesim.simulation.simulation import Simulation
 
 COUNTS = 1_000, 10_000, 100_000

@@ -23,7 +23,6 @@ class OptionError(ValueError):
 def one_line_errors(source: Path) -> Iterator[None]:
     """Expected failures as one line on standard error and an exit code; anything else is a bug and shows where."""
     try:
-        from particlesim.rendering import RenderError  # noqa: PLC0415
         from particlesim.scene.file import SceneError  # noqa: PLC0415
 
         try:
@@ -32,7 +31,7 @@ def one_line_errors(source: Path) -> Iterator[None]:
             _fail_as(error, str(error if error.file else error.within(source)), 2)
         except BrokenPipeError:  # the reader of the output has closed it; typer ends the program
             raise
-        except (RenderError, OSError) as error:
+        except OSError as error:
             _fail_as(error, _described(error), 1)
         except (ValueError, RuntimeError) as error:
             # Errors of other modules of ours, which need not be imported to catch them.

@@ -112,6 +112,9 @@ def simulate(
     """Simulate a scene and write its trajectory (GSD): no OpenGL, no movie."""
     with one_line_errors(scene), place_for(output, scene, ".gsd") as path:
         loaded = load(scene)
+        from particlesim.simulation.needs import check_simulation  # noqa: PLC0415
+
+        check_simulation(loaded, path)
         from particlesim.jobs.movie import simulate as write_trajectory  # noqa: PLC0415
 
         make_file(partial(write_trajectory, resume=resume), loaded, path, quiet, threads, max_drift)
@@ -122,6 +125,9 @@ def check(scene: SceneArgument) -> None:
     """Validate a scene and say what it amounts to, without simulating it."""
     with one_line_errors(scene):
         loaded = load(scene)
+        from particlesim.setup.memory import check_memory  # noqa: PLC0415
+
+        check_memory(loaded.number)
         from particlesim.simulation.estimate import estimate  # noqa: PLC0415
 
         print_table(scene.name, estimate(loaded))

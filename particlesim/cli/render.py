@@ -78,6 +78,9 @@ def render(
         if time is not None and resume:
             raise OptionError("--resume: of a movie, not of the one picture that --still asks for")
         chosen = None if time is not None else frames_asked(total, options)
+        from particlesim.simulation.needs import check_movie  # noqa: PLC0415
+
+        check_movie(scene, path, 1 if chosen is None else len(chosen), simulated=subject is scene)
         from particlesim.jobs import movie  # noqa: PLC0415
 
         if time is None:

@@ -45,6 +45,11 @@ def check_output(path: str | Path, *suffixes: str, beside: Sequence[str] = ()) -
         raise OSError(f"{path}: the folder {path.parent} cannot be written to") from error
 
 
+def partial_folder(path: Path) -> Path:
+    """Where what is finished of an output lies until it is whole."""
+    return path.with_name(f".{path.name}.partial")
+
+
 def check_place(path: Path) -> None:
     """OutputError if something stands at ``path`` that a file cannot take the place of, or that is none."""
     if path.is_dir():

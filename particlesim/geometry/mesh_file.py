@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from particlesim.core.constants import UNITS
+from particlesim.core.mesh_files import check_mesh_file
 
 # A binary STL: a header, the number of its triangles (uint32), and so many bytes for each of them
 # (https://www.loc.gov/preservation/digital/formats/fdd/fdd000505.shtml).
@@ -39,6 +40,10 @@ def mesh_vertices(path: Path, unit: str = "m") -> np.ndarray:
         raise ValueError(f"the unit of a mesh must be one of {', '.join(UNITS)}, not {unit!r}")
     if not path.is_file():
         raise FileNotFoundError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}")
+    try:
+        check_mesh_file(path)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
     points = _points(path, _readable(path, path.read_bytes()))
     if not np.isfinite(points).all():
         raise ValueError(f"{path}: holds numbers that are not finite")
@@ -50,8 +55,6 @@ def _points(path: Path, data: bytes) -> np.ndarray:
     import trimesh  # noqa: PLC0415  (slow to import, needed for meshes only)
 
     ending = path.suffix.lower().removeprefix(".")
-    if ending not in trimesh.available_formats():
-        raise ValueError(f"{path}: must be an STL, OBJ or PLY file")
     try:
         scene: Any = trimesh.load(io.BytesIO(data), file_type=ending, force="scene", process=False)
         solids = [part for part in scene.dump() if len(getattr(part, "faces", ()))]
@@ -75,7 +78,7 @@ def _readable(path: Path, data: bytes) -> bytes:
         return _as_utf8(header) + end + rest
     if ending == ".stl":
         return _whole_stl(path, data)
-    return _as_utf8(data) if ending == ".obj" else data
+    return _as_utf8(data)
 
 
 def _as_utf8(text: bytes) -> bytes:

@@ -18,6 +18,7 @@ from particlesim.rendering import write_image
 from particlesim.rendering.gl import platform
 from particlesim.rendering.video.segments import Segments
 from particlesim.scene import Scene
+from particlesim.simulation.needs import check_movie, check_simulation
 from particlesim.trajectory.gsd_file import Trajectory, TrajectoryWriter
 
 
@@ -62,6 +63,7 @@ def simulate(
         If the file cannot be written.
     """
     check_output(path, ".gsd")
+    check_simulation(scene, Path(path))
     with PartialRun(path, task_of(scene), resume) as run:
         compile_kernels(scene, None, progress)
         source = frame_source(scene, None, threads, progress, run)
@@ -135,6 +137,7 @@ def render(
         chosen = frame_source(movable, frames, threads, progress, run, part)
         scene = look or chosen.scene
         movie = scene.movie
+        check_movie(scene, path, len(chosen.wanted), chosen.trajectory is None)
         with (
             Pictures(chosen, scene, progress, run) as pictures,
             Segments(run.folder, movie.fps, movie.size, movie.crf, pictures.summary.drawn, chosen.begin) as segments,

@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 from particlesim.core.atomic_write import atomic_write, named
+from particlesim.core.output_path import partial_folder
 from particlesim.simulation.simulation import Simulation
 
 # Wall time between two checkpoints [s]: at most so much is done again.
@@ -55,14 +56,14 @@ class PartialRun:
         self._path, self._resume = Path(path), resume
         # As it comes back from the file.
         self._task = json.loads(json.dumps({"version": importlib.metadata.version("particlesim"), **task}))
-        self.folder = folder_of(self._path).absolute()
+        self.folder = partial_folder(self._path).absolute()
         self.kept: dict[str, Any] | None = None  # what was kept last, with "done" and "total" frames
         self._next = time.monotonic() + INTERVAL
 
     def __enter__(self) -> PartialRun:
         lock = _locked(self.folder)
         if lock is None:
-            raise PartialRunError(f"{self._path}: another run is at work on it, in {folder_of(self._path)}")
+            raise PartialRunError(f"{self._path}: another run is at work on it, in {partial_folder(self._path)}")
         self._lock = lock
         try:
             self._look()
@@ -80,7 +81,7 @@ class PartialRun:
         if isinstance(error, OSError):
             named(error, self._path)
         if error is not None and self.kept is not None and (self.folder / _INDEX).exists():
-            error.add_note(f"{_frames(self.kept)} are kept in {folder_of(self._path)}; --resume goes on with them")
+            error.add_note(f"{_frames(self.kept)} are kept in {partial_folder(self._path)}; --resume goes on with them")
 
     @property
     def state(self) -> Path | None:
@@ -119,7 +120,7 @@ class PartialRun:
                 file.unlink()
             return
         self.kept = found
-        where = f"{self._path}: there is a partial run of it, {_frames(found)}, in {folder_of(self._path)}"
+        where = f"{self._path}: there is a partial run of it, {_frames(found)}, in {partial_folder(self._path)}"
         remove = f"'particlesim clean --remove {self._path}' removes it"
         if not self._resume:
             raise PartialRunError(f"{where}; --resume goes on with it, {remove}")
@@ -137,14 +138,9 @@ class Found(NamedTuple):
     at_work: bool
 
 
-def folder_of(path: Path) -> Path:
-    """Where the partial run of an output lies."""
-    return path.with_name(f".{path.name}.partial")
-
-
 def partial_runs(place: Path) -> Iterator[Found]:
     """The partial runs in a folder, or of an output."""
-    folders = sorted(place.glob(".*.partial")) if place.is_dir() else [folder_of(place)]
+    folders = sorted(place.glob(".*.partial")) if place.is_dir() else [partial_folder(place)]
     for folder in folders:
         if not folder.is_dir():
             continue

@@ -22,6 +22,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from particlesim.core.mesh_files import check_mesh_file
 from particlesim.scene.errors import SceneError
 from particlesim.scene.messages import OUT_OF_REACH, hint, must_be
 from particlesim.scene.validation_errors import explain
@@ -122,13 +123,14 @@ def paths_from(folder: Path | None) -> Iterator[None]:
         _folder.reset(token)
 
 
-def existing_file(path: Path) -> Path:
-    """The path from the folder of its scene. ValueError if there is no such file."""
+def mesh_file(path: Path) -> Path:
+    """The path of a mesh from the folder of its scene. ValueError if there is no such file, or not one that is read."""
     folder = _folder.get()
     if folder is None:
         return path
     if not (folder / path).is_file():
         raise ValueError("is a folder" if (folder / path).is_dir() else "no such file")
+    check_mesh_file(folder / path)
     return folder / path
 
 

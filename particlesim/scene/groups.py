@@ -30,7 +30,7 @@ from particlesim.scene.base import (
     Text,
     Vector,
     colour_or,
-    existing_file,
+    mesh_file,
     shorthand,
     whole,
 )
@@ -109,7 +109,7 @@ class MeshShape(Model):
     """The convex hull of an STL, OBJ or PLY file, times the size. Paths start at the scene file's folder."""
 
     kind: Literal["mesh"]
-    file: Annotated[File, AfterValidator(existing_file)]
+    file: Annotated[File, AfterValidator(mesh_file)]
     unit: _Unit = "m"
     rounding: Rounding = 0.0
 

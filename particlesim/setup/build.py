@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -25,6 +23,7 @@ from particlesim.scene.groups import FixedSize, Group, ListPlacement
 from particlesim.scene.surface import WALLS
 from particlesim.setup.fields import fields_of
 from particlesim.setup.initial_motion import random_quaternions, set_in_motion
+from particlesim.setup.memory import check_memory
 from particlesim.setup.obstacles import Obstacle, obstruct
 from particlesim.setup.orientations import of_body_axes, quaternion_of
 from particlesim.setup.placement import positions, unit_hint
@@ -37,9 +36,6 @@ _DEFAULT_DENSITY = 1000.0
 
 # Particles that a list puts into each other deeper than this fraction of their sizes are refused.
 _TOLERATED_OVERLAP = 1e-9
-
-# Bytes a particle takes: constants, state, boxes, and the broad phase and the candidate pairs at their largest.
-BYTES_PER_PARTICLE = 1000
 
 _BOUNDARIES = {"wall": WALL, "periodic": PERIODIC, "open": OPEN}
 
@@ -184,25 +180,6 @@ def _particles(
     mass = np.array([math.nan if g.mass is None else g.mass for g in scene.groups])[group_of]
     density = np.where(np.isnan(mass), density, mass / volume)
     return make_particles(shapes, shape, group_of, size, density)
-
-
-def check_memory(particles: int) -> None:
-    """SceneError if this machine has no memory for so many particles."""
-    needed, there = BYTES_PER_PARTICLE * particles, _memory()
-    if needed > there:
-        message = (
-            f"{particles:,} particles need about {needed / 1e9:,.0f} GB of memory; there are {there / 1e9:,.0f} GB"
-        )
-        raise SceneError(message, "particles")
-
-
-def _memory() -> float:
-    """Bytes of memory that this process may have: the machine's, or what its container is allowed."""
-    machine = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    try:
-        return min(machine, float(Path("/sys/fs/cgroup/memory.max").read_text()))
-    except (OSError, ValueError):  # no container, or one that says "max"
-        return machine
 
 
 def _check_sizes(scene: Scene, domain: np.void, particles: np.ndarray) -> None:

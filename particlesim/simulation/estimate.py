@@ -12,7 +12,8 @@ from particlesim.core.jit import is_compiled
 from particlesim.scene import Scene
 from particlesim.scene.camera import Movie
 from particlesim.scene.file import SceneError
-from particlesim.setup.build import BYTES_PER_PARTICLE
+from particlesim.setup.memory import BYTES_PER_PARTICLE
+from particlesim.simulation.needs import movie_bytes, trajectory_bytes
 from particlesim.simulation.simulation import MOST_STEPS, Simulation
 
 # Seconds for which steps are measured, of which one may take longer.
@@ -37,6 +38,7 @@ def estimate(scene: Scene) -> list[tuple[str, str]]:
         ("duration", f"{scene.duration:g} s"),
         ("frames", f"{scene.frames:,} of {movie.size[0]} x {movie.size[1]} at {movie.fps:g} a second{_speed(movie)}"),
         ("memory", f"about {_bytes(scene) / 1e6:,.0f} MB"),
+        ("disk", _disk(scene)),
         ("computing", _computing(simulation)),
     ]
 
@@ -104,6 +106,15 @@ def _time_step(simulation: Simulation) -> str:
 def _speed(movie: Movie) -> str:
     """How fast a movie shows what happens, if not as fast as it does."""
     return "" if movie.speed == 1.0 else f", {movie.speed:g} times as fast as it happens"
+
+
+def _disk(scene: Scene) -> str:
+    trajectory, movie = trajectory_bytes(scene), movie_bytes(scene.movie, scene.frames)
+    return f"about {_megabytes(trajectory)} as a trajectory, {_megabytes(movie)} as a movie"
+
+
+def _megabytes(count: float) -> str:
+    return f"{count / 1e6:,.{0 if count > 1e7 else 1}f} MB"
 
 
 def _bytes(scene: Scene) -> float:

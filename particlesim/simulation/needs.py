@@ -1,0 +1,70 @@
+"""What a run takes of the disk, estimated before it begins. It is light to import: asked before all else."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from pathlib import Path
+
+from particlesim.core.constants import SEGMENT
+from particlesim.core.output_path import OutputError, partial_folder
+from particlesim.scene import Scene
+from particlesim.scene.camera import Movie
+from particlesim.scene.groups import SphereShape
+from particlesim.setup.memory import check_memory
+
+# Bytes of a frame of a trajectory: its ledger; position, orientation, velocity and impacts of each particle; angular
+# momentum, which smooth spheres do not have; how often each went round a periodic world.
+_LEDGER, _PARTICLE, _SPIN, _IMAGE = 2400, 44, 16, 12
+
+# Bytes of a checkpoint for each particle; the one before goes when the next is whole.
+_CHECKPOINT = 2 * 430
+
+# Bytes a pixel of a movie at crf 18, of which x264 doubles or halves six more or less: 0.03 to 0.07 in the movies of
+# the README. The least is what a movie takes in which next to nothing moves.
+_PIXEL, _LEAST = 0.04, 0.001
+
+
+def trajectory_bytes(scene: Scene) -> float:
+    """Of a whole run."""
+    particle = _PARTICLE
+    if not all(isinstance(group.shape, SphereShape) for group in scene.groups):
+        particle += _SPIN
+    if "periodic" in scene.world.boundary:
+        particle += _IMAGE
+    return float(scene.frames) * (_LEDGER + particle * scene.number)
+
+
+def movie_bytes(movie: Movie, pictures: int, at_crf_18: float = _PIXEL) -> float:
+    """Of a movie of so many pictures."""
+    return at_crf_18 * 2.0 ** ((18 - movie.crf) / 6.0) * pictures * math.prod(movie.size)
+
+
+def check_simulation(scene: Scene, path: Path) -> None:
+    """SceneError if a scene does not fit into memory, OutputError if its trajectory does not fit on the disk."""
+    check_memory(scene.number)
+    _check_disk(path, trajectory_bytes(scene) + _CHECKPOINT * scene.number)
+
+
+def check_movie(scene: Scene, path: Path, pictures: int, simulated: bool) -> None:
+    """As ``check_simulation``, of a movie: even one in which next to nothing moves does not fit."""
+    state = 0
+    if simulated:
+        check_memory(scene.number)
+        state = _CHECKPOINT * scene.number
+    movie = scene.movie
+    segment = 3 * math.prod(movie.size) * min(pictures, SEGMENT)
+    # Segments are there until they are joined.
+    _check_disk(path, 2.0 * movie_bytes(movie, pictures, _LEAST) + segment + state)
+
+
+def _check_disk(path: Path, needed: float) -> None:
+    """OutputError if so many bytes do not fit beside those of the partial run that is there."""
+    folder = partial_folder(path)
+    kept = sum(file.stat().st_size for file in folder.iterdir()) if folder.is_dir() else 0
+    free = shutil.disk_usage(path.parent).free + kept
+    if needed > free:
+        raise OutputError(
+            f"{path}: takes {needed / 1e9:,.1f} GB on the disk, of which {free / 1e9:,.1f} GB are free: "
+            "fewer frames or particles, smaller pictures, or another folder"
+        )
