@@ -17,7 +17,7 @@ from .scene.file import SceneError as SceneError
 from .scene.file import load_scene as load_scene
 from .simulation.checkpoint import CheckpointError as CheckpointError
 from .simulation.simulation import Simulation as Simulation
-from .simulation.simulation import SimulationError as SimulationError
+from .simulation.soundness import SimulationError as SimulationError
 from .trajectory.frames import Ledger as Ledger
 from .trajectory.gsd_file import Trajectory as Trajectory
 from .trajectory.gsd_file import TrajectoryError as TrajectoryError

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from particlesim.dynamics.settings import STEP_DISPLACEMENT
-from particlesim.simulation.simulation import Simulation, SimulationError
+from particlesim.simulation.simulation import Simulation
+from particlesim.simulation.soundness import SimulationError
 from tests.worlds import gas, listed, scene
 
 

@@ -15,6 +15,7 @@ from particlesim.jobs.partial_run import PartialRun
 from particlesim.scene import Scene
 from particlesim.simulation.estimate import check_end
 from particlesim.simulation.simulation import Simulation
+from particlesim.simulation.soundness import check_energy
 from particlesim.trajectory.frames import Frame, Header
 from particlesim.trajectory.gsd_file import Trajectory
 
@@ -68,7 +69,12 @@ def frames_ahead(
         held.append((number, frame))
         tell(progress, source.phase, number + 1, source.total)
     sample = [held[k][1] for k in _spread_over(len(held))]
-    return itertools.dropwhile(lambda numbered: numbered[0] < kept, itertools.chain(held, whole)), sample
+    return frames_after(itertools.chain(held, whole), kept), sample
+
+
+def frames_after(frames: Frames, kept: int) -> Frames:
+    """The frames of a simulation but the ``kept`` first: one that begins anew gives these again."""
+    return itertools.dropwhile(lambda numbered: numbered[0] < kept, frames)
 
 
 @contextmanager
@@ -117,7 +123,7 @@ def frame_source(
     if run is not None and run.state:
         simulation = Simulation.load(run.state, threads=threads)
     total = max(wanted) + 1
-    frames = frames_of(simulation, total, kept if run is not None and run.state else 0)
+    frames = frames_of(simulation, first, total, kept if run is not None and run.state else 0)
     return FrameSource(source, header, first, frames, total, wanted, "simulating", simulation)
 
 
@@ -132,12 +138,12 @@ def frame_source_until(
     before = source.frame_at(time) + 1
 
     def frames() -> Frames:
-        yield from frames_of(simulation, before)
+        yield from frames_of(simulation, first, before)
         simulation.run_until(time)
         yield before, simulation.frame()
 
-    last = range(before, before + 1)
-    return FrameSource(source, simulation.header, simulation.frame(), frames(), before + 1, last, "simulating")
+    last, first = range(before, before + 1), simulation.frame()
+    return FrameSource(source, simulation.header, first, frames(), before + 1, last, "simulating")
 
 
 def start(scene: Scene, threads: int | None, progress: Progress | None) -> Simulation:
@@ -148,15 +154,21 @@ def start(scene: Scene, threads: int | None, progress: Progress | None) -> Simul
     return simulation
 
 
-def frames_of(simulation: Simulation, total: int, first: int = 0) -> Frames:
-    """Frames ``first`` to ``total`` - 1 of a scene and their numbers: at time zero and at every tick of its movie."""
-    for k in range(first, total):
+def frames_of(simulation: Simulation, first: Frame, total: int, begin: int = 0) -> Frames:
+    """Frames ``begin`` to ``total`` - 1 of a scene and their numbers: at time zero and at every tick of its movie.
+
+    SimulationError where one cannot be, such as for its energy after the ``first``.
+    """
+    for k in range(begin, total):
         end = simulation.scene.time_of(k)
         while simulation.time < end:
             simulation.step_towards(end)
             if simulation.time < end:
                 yield k, None
-        yield k, simulation.frame()
+        frame = simulation.frame()
+        if first.ledger is not None and frame.ledger is not None:
+            check_energy(simulation.scene, simulation.model, first.ledger, frame.ledger)
+        yield k, frame
 
 
 def tell(progress: Progress | None, phase: str, done: int, total: int) -> None:

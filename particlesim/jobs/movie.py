@@ -19,6 +19,7 @@ from particlesim.rendering.gl import platform
 from particlesim.rendering.video.segments import Segments
 from particlesim.scene import Scene
 from particlesim.simulation.needs import check_movie, check_simulation
+from particlesim.simulation.soundness import SimulationError
 from particlesim.trajectory.gsd_file import Trajectory, TrajectoryWriter
 
 
@@ -68,18 +69,23 @@ def simulate(
         compile_kernels(scene, None, progress)
         source = frame_source(scene, None, threads, progress, run)
         summary = summary_of(scene, source.header)
-        if run.kept:
+        if run.kept and run.state:
             summary.go_on(run.kept["values"])
         growing = run.folder / "trajectory.gsd"
         with TrajectoryWriter(growing, source.header, summary.frames) as writer:
-            for _, frame in timed(summary, source.phase, source.frames):
-                if frame is not None:
-                    writer.append(frame)
-                    summary.add(frame)
-                    tell(progress, source.phase, summary.frames, source.total)
-                if run.due():
-                    writer.flush()
-                    run.keep(summary.frames, source.total, source.simulation, summary.table())
+            try:
+                for _, frame in timed(summary, source.phase, source.frames):
+                    if frame is not None:
+                        writer.append(frame)
+                        summary.add(frame)
+                        tell(progress, source.phase, summary.frames, source.total)
+                    if run.due():
+                        writer.flush()
+                        run.keep(summary.frames, source.total, source.simulation, summary.table())
+            except SimulationError:
+                writer.flush()
+                run.keep(summary.frames, source.total, None, summary.table())
+                raise
         os.replace(growing, path)
     return summary
 

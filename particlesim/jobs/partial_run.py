@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 from particlesim.core.atomic_write import atomic_write, named
 from particlesim.core.output_path import partial_folder
 from particlesim.simulation.simulation import Simulation
+from particlesim.simulation.soundness import SimulationError
 
 # Wall time between two checkpoints [s]: at most so much is done again.
 INTERVAL = 10.0
@@ -81,7 +82,11 @@ class PartialRun:
         if isinstance(error, OSError):
             named(error, self._path)
         if error is not None and self.kept is not None and (self.folder / _INDEX).exists():
-            error.add_note(f"{_frames(self.kept)} are kept in {partial_folder(self._path)}; --resume goes on with them")
+            where = f"kept in {partial_folder(self._path)}"
+            if isinstance(error, SimulationError):
+                error.add_note(f"{_frames(self.kept)}, those before that, are {where}")
+            else:
+                error.add_note(f"{_frames(self.kept)} are {where}; --resume goes on with them")
 
     @property
     def state(self) -> Path | None:
@@ -93,7 +98,10 @@ class PartialRun:
         return time.monotonic() >= self._next
 
     def keep(self, done: int, total: int, simulation: Simulation | None, values: dict[str, Any]) -> None:
-        """Keep what is done from now on: frames, the files in the folder, the state of a simulation, plain values."""
+        """Keep what is done from now on: frames, the files in the folder, the state of a simulation, plain values.
+
+        Without a state, the simulation begins anew when the run is gone on with.
+        """
         start = time.monotonic()
         state = f"{simulation.steps}.ckpt" if simulation is not None else None
         if simulation is not None:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from particlesim.jobs.drawers import Drawers
-from particlesim.jobs.frame_source import FrameSource, Progress, frames_ahead, tell
+from particlesim.jobs.frame_source import Frames, FrameSource, Progress, frames_after, frames_ahead, tell
 from particlesim.jobs.partial_run import PartialRun
 from particlesim.jobs.summary import Summary
 from particlesim.rendering.hud.history import History
@@ -19,6 +19,7 @@ from particlesim.rendering.shading.fields import is_settled_by_frames
 from particlesim.rendering.video.fade import faded, strength
 from particlesim.scene import Scene
 from particlesim.setup.build import contact_laws_of
+from particlesim.simulation.soundness import SimulationError
 from particlesim.trajectory.frames import Frame, Header, ledger_of, ledger_table
 
 _T = TypeVar("_T")
@@ -45,12 +46,16 @@ class Pictures:
         else:
             self._pass_over(source.wanted[: source.begin])
             self.summary.drawn = source.begin
-        self._frames = timed(self.summary, source.phase, source.frames)
+        self._wrong: SimulationError | None = None  # why there are no more frames
+        self._frames = self._sound(timed(self.summary, source.phase, source.frames))
         # What is simulated ahead is not where the pictures are: such a run is simulated anew when it is gone on with.
         self._simulation = None if is_settled_by_frames(scene) else source.simulation
         sample: list[Frame] = []
         if is_settled_by_frames(scene):
             self._frames, sample = frames_ahead(source, self._frames, progress, self.summary.frames)
+        elif source.simulation is not None:
+            self._frames = frames_after(self._frames, self.summary.frames)
+        self._ended = False
         self._drawers = Drawers(look_of(scene, source.header, source.first, sample), len(source.wanted))
         self._drawers.seconds = self.summary.seconds.get("drawing", 0.0)
 
@@ -69,7 +74,7 @@ class Pictures:
         """
         movie, summary, count = self._movie, self.summary, len(self._source.wanted)
         background = encoded(movie.background)
-        while summary.frames < self._source.total:
+        while not self._ended:
             for image in self._drawers.draw(self._until_due()):
                 if summary.drawn == poster_place(count):
                     self._keep_poster(image)
@@ -78,9 +83,11 @@ class Pictures:
                 summary.seconds["drawing"] = self._drawers.seconds
                 self._tell()
                 yield faded(image, seen, background)
-            if self._run is not None and self._run.due():
+            if self._run is not None and (self._run.due() or (self._ended and self._wrong)):
                 flush()
                 self._keep(self._run)
+        if self._wrong is not None:
+            raise self._wrong
         self._pass_over(self._source.wanted[self._source.total :])
         summary.drawn -= self._source.begin
 
@@ -93,7 +100,10 @@ class Pictures:
             self._history = self._history.then(ledger)
 
     def _until_due(self) -> Iterator[tuple[Frame, History]]:
-        """Frames to draw, each with what its readout needs of those before it, until something is to be kept."""
+        """Frames to draw, each with what its readout needs of those before it, until something is to be kept.
+
+        One that cannot be ends them: those before it are drawn first.
+        """
         for number, frame in self._frames:
             if frame is not None:
                 self.summary.add(frame)
@@ -104,6 +114,14 @@ class Pictures:
                     self._tell()
             if self._run is not None and self._run.due():
                 return
+        self._ended = True
+
+    def _sound(self, frames: Frames) -> Frames:
+        """The frames until one that cannot be."""
+        try:
+            yield from frames
+        except SimulationError as error:
+            self._wrong, self._simulation = error, None
 
     def _keep(self, run: PartialRun) -> None:
         history = [ledger_table(ledger) for ledger in self._history.ledgers]

@@ -23,14 +23,11 @@ from particlesim.setup.build import build
 from particlesim.simulation.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from particlesim.simulation.conserved import conserved
 from particlesim.simulation.flow import Flow, FlowState
+from particlesim.simulation.soundness import check_particles
 from particlesim.trajectory.frames import Frame, Header, Ledger
 
 # A run of more time steps than this is refused: it would take years.
 MOST_STEPS = 1e12
-
-
-class SimulationError(RuntimeError):
-    """The state has become impossible: a number that is not finite."""
 
 
 class Simulation:
@@ -305,8 +302,8 @@ class Simulation:
         )
 
     def frame(self) -> Frame:
-        """The present moment, copied. SimulationError if a number in it is not finite."""
-        self._check_finite()
+        """The present moment, copied. SimulationError if it cannot be, such as for a number that is not finite."""
+        check_particles(self.scene, self.model, self.time)
         b = self.model.particles
         return Frame(
             time=self.time,
@@ -325,12 +322,3 @@ class Simulation:
         system, states = self.model.system, (self._solver.state, self._flow.state)
         arrays = [array for state in states for array in state.arrays().values()]
         return digest(system.body, system.law, system.motion, system.domain, *arrays)
-
-    def _check_finite(self) -> None:
-        b = self.model.particles
-        for name in ("position", "orientation", "velocity", "angular_momentum"):
-            bad = np.flatnonzero(~np.isfinite(b[name]).all(axis=1))
-            if len(bad):
-                i = int(bad[0])
-                whose = f"particle {b['id'][i]} ({self.scene.key(b['group'][i])} of the scene)"
-                raise SimulationError(f"{name} of {whose} is not finite at {self.time:g} s")

@@ -16,7 +16,7 @@ from particlesim.jobs.pictures import summary_of
 from particlesim.jobs.task import task_of
 from particlesim.scene import Scene
 from particlesim.scene.errors import SceneError
-from particlesim.simulation.simulation import SimulationError
+from particlesim.simulation.soundness import SimulationError
 from particlesim.trajectory.analysis.observables import pressure
 from particlesim.trajectory.frames import Ledger
 
