@@ -6,6 +6,7 @@ from .geometry.separation import Separation as Separation
 from .geometry.separation import separation as separation
 from .geometry.shapes import CATALOGUE as CATALOGUE
 from .geometry.shapes import Shape as Shape
+from .jobs.export import export as export
 from .jobs.movie import render as render
 from .jobs.movie import simulate as simulate
 from .jobs.movie import still as still

@@ -14,6 +14,7 @@ import typer.core
 from particlesim.cli.bench import measure_drawing, measure_settling, measure_steps
 from particlesim.cli.clean import clean
 from particlesim.cli.errors import fail, one_line_errors
+from particlesim.cli.export import export
 from particlesim.cli.info import info
 from particlesim.cli.join import join
 from particlesim.cli.options import MaxDrift, Quiet, Resume, SceneArgument, Threads
@@ -228,6 +229,7 @@ def doctor() -> None:
 
 app.command(short_help="Simulate many cases of a scene.")(sweep)
 app.command(short_help="Draw figures of a run, and write its numbers.")(plot)
+app.command(short_help="Write a run for ParaView, Blender, OVITO and others.")(export)
 app.command(short_help="Say where a movie, a picture or a trajectory comes from.")(info)
 app.command(short_help="Show partial runs, and remove them.")(clean)
 

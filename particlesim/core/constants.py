@@ -35,5 +35,8 @@ SEGMENT = 60
 MESH_ENDINGS = (".stl", ".obj", ".ply")
 LARGEST_MESH = 100_000_000
 
+# Endings of what runs are exported to; the first is what is written if none is named.
+EXPORT_ENDINGS = (".pvd", ".glb", ".usda", ".xyz")
+
 # What is told, with how many kernels of how many, while they are compiled.
 COMPILING = "compiling, this once"

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 from particlesim.core.extras import require
 from particlesim.core.figure import save_figure
 from particlesim.core.output_path import check_output
 from particlesim.jobs.compiling import compile_kernels
-from particlesim.jobs.frame_source import FrameSource, Progress, frame_source, opened, tell
+from particlesim.jobs.frame_source import Progress, frame_source, opened, told
 from particlesim.scene import Scene
 from particlesim.trajectory.analysis.measurements import measured
 from particlesim.trajectory.analysis.panels import draw_panels, table_of
 from particlesim.trajectory.analysis.table_files import write_csv, write_parquet
-from particlesim.trajectory.frames import Frame
 from particlesim.trajectory.gsd_file import Trajectory
 
 
@@ -68,18 +66,10 @@ def plot(
         if isinstance(movable, Scene):
             compile_kernels(movable, None, progress)
         chosen = frame_source(movable, None, threads, progress)
-        run = measured(chosen.scene, chosen.header, _frames(chosen, progress), chosen.total)
+        run = measured(chosen.scene, chosen.header, told(chosen, progress), chosen.total)
     written = save_figure(draw_panels(run, what), path)
     for file, _, write in tables:
         if file is not None:
             write(file, run.table(which))
             written.append(file)
     return written
-
-
-def _frames(source: FrameSource, progress: Progress | None) -> Iterator[Frame]:
-    """The frames of a source, told as they pass."""
-    for number, frame in source.frames:
-        if frame is not None:
-            yield frame
-            tell(progress, source.phase, number + 1, source.total)

@@ -171,6 +171,14 @@ def frames_of(simulation: Simulation, first: Frame, total: int, begin: int = 0) 
         yield k, frame
 
 
+def told(source: FrameSource, progress: Progress | None) -> Iterator[Frame]:
+    """The frames of a source, told as they pass."""
+    for number, frame in source.frames:
+        if frame is not None:
+            yield frame
+            tell(progress, source.phase, number + 1, source.total)
+
+
 def tell(progress: Progress | None, phase: str, done: int, total: int) -> None:
     """Say how far the work is, if it is to be said."""
     if progress is not None:

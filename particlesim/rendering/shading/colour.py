@@ -63,7 +63,7 @@ class ParticleColours:
         self.begin = map_begin(encoded(scene.movie.background))
         # In linear light, fine enough that no step of 8 bits is left out.
         self._map = (map_colours(np.linspace(0.0, 1.0, 1024), self.begin) ** 2).astype(np.float32)
-        self._fixed = _fixed_colours(scene, header)
+        self._fixed = fixed_colours(scene, header)
         kinds = [kind for kind in FIELDS if any(group.colour == kind for group in scene.groups)]
         self.fields = [field_of(kind, scene, header, frames) for kind in kinds]
         # Which of the fields a particle is coloured by, or -1.
@@ -121,15 +121,16 @@ def shape_colours(header: Header) -> np.ndarray:
     return np.array(chosen).reshape(-1, 3)
 
 
-def _fixed_colours(scene: Scene, header: Header) -> np.ndarray:
+def fixed_colours(scene: Scene, header: Header) -> np.ndarray:
+    """Linear RGB (n, 3) float32 of all particles by id; by shape where a field would say it anew at each time."""
     by_shape = shape_colours(header)
     colours = np.zeros((len(header.group), 3), dtype=np.float32)
     for number, group in enumerate(scene.groups):
         members = header.group == number
-        if group.colour == "by_shape":
+        if group.colour == "by_shape" or group.colour in FIELDS:
             colours[members] = by_shape[header.shape[members]]
         elif group.colour == "by_group":
             colours[members] = palette_colour(number) ** 2
-        elif group.colour not in FIELDS:
+        else:
             colours[members] = parse(group.colour)
     return colours

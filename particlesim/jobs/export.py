@@ -1,0 +1,68 @@
+"""From a scene or a trajectory to the formats of other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from particlesim.core.constants import EXPORT_ENDINGS
+from particlesim.core.output_path import check_output
+from particlesim.jobs.compiling import compile_kernels
+from particlesim.jobs.frame_source import Progress, frame_source, opened, told
+from particlesim.rendering.shading.colour import fixed_colours
+from particlesim.scene import Scene
+from particlesim.trajectory.export import Exported
+from particlesim.trajectory.export.gltf import write_glb
+from particlesim.trajectory.export.usd import usd_modules, write_usd
+from particlesim.trajectory.export.vtk import check_folder, write_pvd
+from particlesim.trajectory.export.xyz import write_xyz
+from particlesim.trajectory.gsd_file import Trajectory
+
+_Writer = Callable[[Path, Exported], list[Path]]
+_WRITERS: dict[str, _Writer] = dict(zip(EXPORT_ENDINGS, (write_pvd, write_glb, write_usd, write_xyz), strict=True))
+
+
+def export(
+    source: Scene | Trajectory | str | Path,
+    path: str | Path,
+    *,
+    progress: Progress | None = None,
+    threads: int | None = None,
+) -> list[Path]:
+    """Write a scene, simulating it, or a trajectory for other programs.
+
+    Parameters
+    ----------
+    source
+        A scene, a trajectory, or the path of a trajectory.
+    path
+        Its ending says the format: .pvd (VTK), .glb (glTF), .usda (USD) or .xyz (extended XYZ).
+    progress, threads
+        As for ``simulate``.
+
+    Returns
+    -------
+    What was written; beside x.pvd there is a folder x.
+
+    Raises
+    ------
+    ExportError
+        For more particles than the format holds.
+    MissingExtraError
+        For USD without usd-core, before any work.
+    OutputError, TrajectoryError, SceneError, SimulationError, OSError
+        As for ``simulate``.
+    """
+    path = Path(path)
+    check_output(path, *EXPORT_ENDINGS)
+    suffix = path.suffix.lower()
+    if suffix == ".usda":
+        usd_modules()
+    if suffix == ".pvd":
+        check_folder(path)
+    with opened(source) as movable:
+        if isinstance(movable, Scene):
+            compile_kernels(movable, None, progress)
+        chosen = frame_source(movable, None, threads, progress)
+        colours = fixed_colours(chosen.scene, chosen.header)
+        return _WRITERS[suffix](path, Exported(chosen.scene, chosen.header, told(chosen, progress), colours))

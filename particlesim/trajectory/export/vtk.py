@@ -1,0 +1,104 @@
+"""A series for ParaView and VTK: x.pvd, and beside it a folder x with a file for each frame and one for each shape.
+
+The files are VTK XML (https://docs.vtk.org, "VTK XML formats"), with base64 arrays. A frame is points with the data of
+the particles. Glyphs are drawn with ``orientation`` as quaternion (w, x, y, z), scaled by ``size``, of the shape
+whose number is ``shape``: its surface is in shape_NUMBER.vtu.
+"""
+
+from __future__ import annotations
+
+import base64
+import os
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from particlesim.core.output_path import OutputError
+from particlesim.geometry.surface import surface_of
+from particlesim.trajectory.export import Exported
+from particlesim.trajectory.frames import Frame, Header
+
+_TYPES = {"f": "Float", "i": "Int", "u": "UInt"}
+_VERTEX, _TRIANGLE = 1, 5  # kinds of cells
+
+
+def write_pvd(path: Path, run: Exported) -> list[Path]:
+    """Write a series; what names its files comes last, when all are there. OSError if it cannot be written."""
+    folder, entries = path.with_suffix(""), []
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem[:40]}.") as hidden:
+        made = Path(hidden) / folder.name
+        made.mkdir()
+        for number, shape in enumerate(run.header.shapes):
+            surface = surface_of(shape)
+            text = _grid(surface.vertices, surface.triangles, _TRIANGLE, {"Normals": surface.normals})
+            (made / f"shape_{number}.vtu").write_text(text, encoding="ascii")
+        for number, frame in enumerate(run.frames):
+            name = f"frame_{number:05d}.vtu"
+            (made / name).write_text(_points(run.header.of(frame), frame), encoding="ascii")
+            entries.append(f'<DataSet timestep="{frame.time:.17g}" part="0" file="{folder.name}/{name}"/>')
+        index = Path(hidden) / path.name
+        index.write_text(_file("Collection", "\n".join(entries)), encoding="utf-8")
+        former = Path(hidden) / "former"
+        if folder.exists():
+            os.rename(folder, former)
+        try:
+            os.rename(made, folder)
+        except OSError:
+            if former.exists():
+                os.rename(former, folder)
+            raise
+        os.replace(index, path)
+    return [path, folder]
+
+
+def check_folder(path: Path) -> None:
+    """OutputError if the folder of frames would take the place of what is no former series."""
+    folder = path.with_suffix("")
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise OutputError(f"{path}: its frames go to a folder {folder}, where something else is")
+    if folder.exists() and not path.exists():
+        raise OutputError(f"{path}: its frames go to a folder {folder}, which is there and is of no {path.name}")
+
+
+def _points(header: Header, frame: Frame) -> str:
+    """The particles of a frame, which the header is of."""
+    data = {
+        **{"id": frame.ids, "shape": header.shape, "group": header.group, "size": header.size, "mass": header.mass},
+        **{"orientation": frame.orientation, "velocity": frame.velocity, "angular_momentum": frame.angular_momentum},
+        "impacts": frame.impacts,
+    }
+    return _grid(frame.position, np.arange(len(frame.position))[:, None], _VERTEX, data)
+
+
+def _grid(points: np.ndarray, cells: np.ndarray, kind: int, data: dict[str, np.ndarray]) -> str:
+    """Points with data, and cells of as many of them each."""
+    corners = cells.shape[1]
+    parts = {
+        "Points": [_array("Points", points)],
+        "Cells": [
+            _array("connectivity", cells.ravel()),
+            _array("offsets", corners * np.arange(1, len(cells) + 1)),
+            _array("types", np.full(len(cells), kind, dtype=np.uint8)),
+        ],
+        "PointData": [_array(name, values) for name, values in data.items()],
+    }
+    body = "\n".join(f"<{name}>\n{chr(10).join(arrays)}\n</{name}>" for name, arrays in parts.items())
+    piece = f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(cells)}">\n{body}\n</Piece>'
+    return _file("UnstructuredGrid", piece)
+
+
+def _array(name: str, values: np.ndarray) -> str:
+    """An array, little-endian, after the number of its bytes."""
+    kind = f"{_TYPES[values.dtype.kind]}{8 * values.dtype.itemsize}"
+    content = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<")).tobytes()
+    text = base64.b64encode(len(content).to_bytes(8, "little") + content).decode()
+    wide = values.shape[1] if values.ndim > 1 else 1
+    return f'<DataArray type="{kind}" Name="{name}" NumberOfComponents="{wide}" format="binary">{text}</DataArray>'
+
+
+def _file(kind: str, body: str) -> str:
+    return (
+        f'<?xml version="1.0"?>\n<VTKFile type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
+        f"<{kind}>\n{body}\n</{kind}>\n</VTKFile>\n"
+    )
