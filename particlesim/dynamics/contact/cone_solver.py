@@ -39,7 +39,7 @@ MOVER = record(
         ("before", "f8", (6,)),  # velocity and angular velocity at the start of the step
         ("trial_velocity", "f8", (3,)),  # what impulses that are tried do to it
         ("trial_spin", "f8", (3,)),
-        ("mean", "f8", (6,)),  # velocity and angular velocity as a part of the step begins, then their means in it
+        ("average", "f8", (6,)),  # velocity and angular velocity as a part of the step begins, then their means in it
         ("pull", "f8", (3,)),  # acceleration by gravity and fields [m/s^2]
         ("row", "i8"),  # its number among the members of its island, -1 of an obstacle
     ]

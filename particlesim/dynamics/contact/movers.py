@@ -47,7 +47,7 @@ def write_mover(m, b, row):
         m.inverse_inertia[k] = inverse[k]
     for axis in range(3):
         m.before[axis], m.before[3 + axis] = velocity[axis], spin[axis]
-        m.mean[axis], m.mean[3 + axis] = velocity[axis], spin[axis]
+        m.average[axis], m.average[3 + axis] = velocity[axis], spin[axis]
         m.shift[axis] = m.turn[axis] = 0.0
 
 
@@ -137,7 +137,7 @@ def seek(system, p, mover, closing_speed, time, duration):
     wanted = scale(vec(p.normal), closing_speed)
     if moves(system, p.b):
         a, b = mover[p.a], mover[p.b]
-        shift_a = axpy(vec(a.shift), (a.mean[0], a.mean[1], a.mean[2]), duration)
+        shift_a = axpy(vec(a.shift), (a.average[0], a.average[1], a.average[2]), duration)
         wanted = sub(wanted, surface_gain(system, p, b, shift_a, time + duration))
     set_vec3(p.wanted, wanted)
 
@@ -151,7 +151,7 @@ def begin_means(mover, members):
     for i in members:
         m = mover[i]
         for axis in range(3):
-            m.mean[axis], m.mean[3 + axis] = m.velocity[axis], m.spin[axis]
+            m.average[axis], m.average[3 + axis] = m.velocity[axis], m.spin[axis]
 
 
 @kernel
@@ -160,14 +160,14 @@ def end_means(mover, members):
     for i in members:
         m = mover[i]
         for axis in range(3):
-            m.mean[axis] = 0.5 * (m.mean[axis] + m.velocity[axis])
-            m.mean[3 + axis] = 0.5 * (m.mean[3 + axis] + m.spin[axis])
+            m.average[axis] = 0.5 * (m.average[axis] + m.velocity[axis])
+            m.average[3 + axis] = 0.5 * (m.average[3 + axis] + m.spin[axis])
 
 
 @kernel
 def _mean_at(m, arm):
     """The mean velocity of a mover at an arm from its position."""
-    return add((m.mean[0], m.mean[1], m.mean[2]), cross((m.mean[3], m.mean[4], m.mean[5]), arm))
+    return add((m.average[0], m.average[1], m.average[2]), cross((m.average[3], m.average[4], m.average[5]), arm))
 
 
 @kernel
@@ -188,7 +188,7 @@ def book(system, mover, p, t, impulse, angular_impulse, interval):
         _, drag = along_normal(p, impulse)
         t.rubbed -= dot(drag, sub(of_b, _mean_at(a, vec(p.arm_a))))
     if t.rolling_friction > 0.0:
-        turning = sub((b.mean[3], b.mean[4], b.mean[5]), (a.mean[3], a.mean[4], a.mean[5]))
+        turning = sub((b.average[3], b.average[4], b.average[5]), (a.average[3], a.average[4], a.average[5]))
         t.rolled -= dot(angular_impulse, turning)
 
 
