@@ -43,6 +43,9 @@ def _energy(axes: Any, table: np.ndarray, run: Measurements) -> None:
         if np.nan_to_num(np.abs(values)).max() > seen:
             axes.plot(table["time"], values, color=colour, label=name)
     axes.plot(table["time"], table["energy"], color="k", ls="--", label="kinetic and potential")
+    # Changes by rounding alone would fill the panel.
+    lower, upper = axes.get_ylim()
+    axes.set_ylim(min(1.05 * lower, 0.0), max(1.05 * upper, 0.0))
     axes.legend(frameon=False, fontsize=7)
 
 
