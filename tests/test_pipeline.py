@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import particlesim as ps
-from particlesim.jobs.frame_source import frame_source, frames_ahead
+from particlesim.jobs.frame_source import frame_source, frames_ahead, opened
 from particlesim.rendering.look import look_of
 from particlesim.trajectory.gsd_file import Trajectory
 from tests.worlds import gas, listed, quick_twin, scene
@@ -24,6 +24,15 @@ def test_every_scene_runs(path):
     after = sim.ledger
     assert sim.largest_overlap() < 0.05 * sim.particles.inradius.min()
     assert after.energy <= before.energy * (1 + 1e-9)
+
+
+def test_the_path_of_a_scene_stands_for_it(tmp_path):
+    with opened(str(SCENES[0])) as found:
+        assert found == ps.load_scene(SCENES[0])
+    with pytest.raises(ps.SceneError, match=r"none\.toml"), opened(tmp_path / "none.toml"):
+        pass
+    with pytest.raises(ps.SceneError, match=r"none\.toml"):
+        ps.simulate(tmp_path / "none.toml", tmp_path / "run.gsd")
 
 
 def test_a_movie_has_its_frames_and_shows_its_particles(tmp_path):

@@ -34,7 +34,7 @@ def export(
     Parameters
     ----------
     source
-        A scene, a trajectory, or the path of a trajectory.
+        A scene, a trajectory, or the path of one of them (.toml, .gsd).
     path
         Its ending says the format: .pvd (VTK), .glb (glTF), .usda (USD) or .xyz (extended XYZ).
     progress, threads

@@ -31,7 +31,7 @@ def plot(
     Parameters
     ----------
     source
-        A scene, a trajectory, or the path of a trajectory.
+        A scene, a trajectory, or the path of one of them (.toml, .gsd).
     path
         Of either file, ending in .svg or .png; the other lies beside it.
     what

@@ -13,6 +13,7 @@ import numpy as np
 
 from particlesim.jobs.partial_run import PartialRun
 from particlesim.scene import Scene
+from particlesim.scene.file import load_scene
 from particlesim.simulation.estimate import check_end
 from particlesim.simulation.simulation import Simulation
 from particlesim.simulation.soundness import check_energy
@@ -79,12 +80,17 @@ def frames_after(frames: Frames, kept: int) -> Frames:
 
 @contextmanager
 def opened(source: Scene | Trajectory | str | Path) -> Iterator[Scene | Trajectory]:
-    """A scene or a trajectory, which is opened for the block if its path is given. TrajectoryError if it is none."""
+    """A scene or a trajectory, which is read, or opened for the block, if its path is given: scenes end in .toml.
+
+    SceneError or TrajectoryError if it is none.
+    """
     if not isinstance(source, str | Path):
         yield source
-        return
-    with Trajectory(source) as trajectory:
-        yield trajectory
+    elif Path(source).suffix.lower() == ".toml":
+        yield load_scene(source)
+    else:
+        with Trajectory(source) as trajectory:
+            yield trajectory
 
 
 def frame_source(

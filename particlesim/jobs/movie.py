@@ -18,13 +18,14 @@ from particlesim.rendering import write_image
 from particlesim.rendering.gl import platform
 from particlesim.rendering.video.segments import Segments
 from particlesim.scene import Scene
+from particlesim.scene.file import load_scene
 from particlesim.simulation.needs import check_movie, check_simulation
 from particlesim.simulation.soundness import SimulationError
 from particlesim.trajectory.gsd_file import Trajectory, TrajectoryWriter
 
 
 def simulate(
-    scene: Scene,
+    scene: Scene | str | Path,
     path: str | Path,
     *,
     resume: bool = False,
@@ -36,7 +37,7 @@ def simulate(
     Parameters
     ----------
     scene
-        What to simulate, to its end.
+        What to simulate, to its end, or the path of its file.
     path
         The file, which must end in .gsd; it appears when it is whole.
     resume
@@ -64,6 +65,7 @@ def simulate(
         If the file cannot be written.
     """
     check_output(path, ".gsd")
+    scene = scene if isinstance(scene, Scene) else load_scene(scene)
     check_simulation(scene, Path(path))
     with PartialRun(path, task_of(scene), resume) as run:
         compile_kernels(scene, None, progress)
@@ -106,7 +108,7 @@ def render(
     Parameters
     ----------
     source
-        A scene, a trajectory, or the path of a trajectory.
+        A scene, a trajectory, or the path of one of them (.toml, .gsd).
     path
         The movie, which must end in .mp4; it appears when it is whole.
     look
@@ -175,7 +177,7 @@ def still(
     Parameters
     ----------
     source
-        A scene, a trajectory, or the path of a trajectory.
+        A scene, a trajectory, or the path of one of them (.toml, .gsd).
     path
         The picture, which must end in .png; it appears when it is whole.
     time
