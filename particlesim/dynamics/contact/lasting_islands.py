@@ -54,7 +54,9 @@ def gathered(points: np.ndarray, terms: np.ndarray, seeds: np.ndarray, particles
     seeded = np.zeros(particles, dtype=np.bool_)
     seeded[root[seeds]] = True
     of_point = root[points["a"]]
-    order = np.lexsort((points["b"], points["a"], of_point))
+    # One number each, to sort which takes a twentieth of the time that three keys do; the pairs nearly are in order.
+    bodies = int(points["b"].max(initial=0)) + 1
+    order = np.argsort((of_point * particles + points["a"]) * bodies + points["b"], kind="stable")
     order = order[seeded[of_point[order]]]
     points, terms, of_point = points[order], terms[order], of_point[order]
     touched = np.zeros(particles, dtype=np.bool_)
