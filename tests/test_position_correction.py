@@ -2,13 +2,16 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from particlesim.dynamics.contact.clearance import changes_ahead
 from particlesim.dynamics.contact.cone_solver import MOVER
 from particlesim.dynamics.contact.contact_records import CONTACT_POINT, CONTACT_TERMS
 from particlesim.dynamics.contact.island_step import Islands
 from particlesim.dynamics.contact.movers import write_mover
 from particlesim.dynamics.contact.position_correction import correct_positions
 from particlesim.dynamics.settings import CORRECTED_DEPTH, HELD_BACK_DEPTH
+from particlesim.model.bodies import angular_velocities
 from tests.kernels import callable_from_python
 from tests.touching import contact_of, nearly_touching
 
@@ -71,3 +74,27 @@ def test_what_is_deep_in_each_other_collides_and_is_held_back(shapes):
         turned = [(b["angular_momentum"] ** 2 / b["principal_inertia"]).sum() for b in (before, ahead)]
         if all(shape in ("sphere", "cube") for shape in shapes):
             assert energies[1] + turned[1] <= (energies[0] + turned[0]) * (1.0 + 1e-12)
+
+
+def test_what_does_not_go_as_its_velocity_says_is_seen_to_change():
+    """Velocities and angular momenta ahead are those of before: only where bodies are tells that they are held back."""
+    system, duration = nearly_touching(3, ("cube", "tetrahedron")).model.system, 1.0 / 240.0
+    system.body["velocity"][:2] = (3.0, 0.0, 4.0), (0.0, -2.0, 0.0)
+    system.body["angular_momentum"][:2] = (2e-4, 0.0, 1e-4), (0.0, 3e-4, 0.0)
+    spin = angular_velocities(system.body, 2)
+    held = changes_ahead(system, spin, duration, np.arange(2), system.body.copy())
+    radius = system.body["radius"][:2]
+    assert np.allclose(held[:2], (5.0, 2.0) + np.linalg.norm(spin, axis=1) * radius, rtol=1e-12)
+
+    ahead = system.body.copy()
+    ahead["position"][:2] += duration * system.body["velocity"][:2]
+    for k in range(2):
+        turn = Rotation.from_rotvec(duration * spin[k])
+        ahead["orientation"][k] = (turn * orientation_of(system.body[k])).as_quat(scalar_first=True)
+    free = changes_ahead(system, spin, duration, np.arange(2), ahead)
+    assert (free[:2] < 1e-3 * held[:2]).all()
+
+
+def orientation_of(body):
+    """The orientation of a body's record, as scipy has it."""
+    return Rotation.from_quat(body["orientation"], scalar_first=True)

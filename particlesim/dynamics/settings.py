@@ -152,14 +152,15 @@ MAX_PARALLEL_TOLERANCE = 0.2
 # Faces and edges reach this fraction of the inscribed radius beyond their borders at most [1]: what may slide there.
 MANIFOLD_MARGIN = 0.02
 
-# Bodies may become faster than expected by this factor before contacts are searched again [1]; the fraction of a
-# neighbour's speed that a body is expected to take on, and by how many times the speed that gravity adds in a substep
-# it may become faster [1].
-SPEED_MARGIN = 1.5
-SPEED_HANDED_ON = 0.5
+# By how much the velocity of a body may change in a step: by this fraction of that at which particles approach it [1],
+# and by so many times what gravity adds [1]. Where bodies may have met that this does not show, contacts are searched
+# once more, for changes larger by the third factor [1] than those expected and found. Smaller: more searches; larger:
+# more contact points.
+CHANGE_HANDED_ON = 0.5
 SPEED_GAIN = 2.0
+CHANGE_MARGIN = 1.5
 
-# Searches of contacts in a substep, until no body becomes faster than expected. Fewer: `unresolved` counts sooner.
+# Searches of contacts in a substep, until no bodies may meet unforeseen. Fewer: `unresolved` counts sooner.
 MAX_CONTACT_SEARCHES = 4
 
 # ---- lasting contacts: the step --------------------------------------------------------------------------------------
@@ -208,8 +209,8 @@ REST_SLACK = 2e-4
 MAX_TURNING_SLACK = 0.05
 
 # Bodies may be in each other by this fraction of the inscribed radius at the end of a substep [1]. Those that would be
-# deeper are pushed apart in so many rounds, each by the third fraction of the inscribed radius at most: contacts are
-# known of bodies that are so much nearer than they move. What was deeper before comes out by the last.
+# deeper are pushed apart in so many rounds, each by the third fraction of the inscribed radius at most; contacts are
+# searched anew if that may bring them to what none is known of. What was deeper before comes out by the last.
 CORRECTED_DEPTH = 1e-4
 CORRECTION_ROUNDS = 20
 MAX_CORRECTION = 0.1

@@ -1,15 +1,21 @@
-"""How fast surfaces may move in a step, and how far they have come: what is far enough apart need not be looked at."""
+"""How surfaces may move in a step, and how far they have come: what is far enough apart need not be looked at."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from particlesim.core.jit import entry_kernel, without_refcounts
+from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import (
+    add,
     conjugate,
+    cross,
+    dot,
     load_vec3,
     norm,
     quat_multiply,
+    scale,
     set_quat,
     set_vec3,
     sub,
@@ -17,40 +23,94 @@ from particlesim.core.math3d import (
     to_vec3,
 )
 from particlesim.dynamics.ccd.swept_bounds import largest_acceleration
-from particlesim.dynamics.settings import SPEED_HANDED_ON
-from particlesim.model.bodies import KINEMATIC
+from particlesim.dynamics.settings import CHANGE_HANDED_ON
+from particlesim.geometry.support import half_space_plane, is_half_space, is_sphere
+from particlesim.model.bodies import KINEMATIC, angular_velocity, placed
 from particlesim.model.domain import nearest_image
 
 
-@entry_kernel
-def surface_speeds(system, spin, duration):
-    """How fast the surface of each body moves at most, of obstacles within ``duration`` [s], (n,) [m/s].
+@kernel
+def turning_speed(system, spin, i):
+    """How fast the surface of a bounded body that is no sphere moves at most by turning [m/s]."""
+    shapes, b = system.shapes, system.body[i]
+    still = is_half_space(shapes, b.shape_row) or is_sphere(shapes, b.shape_row)
+    return 0.0 if still else norm(load_vec3(spin, i)) * b.radius
 
-    Of half-spaces without what turning does, which depends on where.
+
+@kernel
+def _approach(system, spin, i, j, duration):
+    """How fast surfaces of two bounded bodies meet at most that may do so in a time [s], 0 if they do not."""
+    a, b = system.body[i], system.body[j]
+    offset = nearest_image(sub(to_vec3(b.position), to_vec3(a.position)), system.domain[0].period)
+    velocity = sub(to_vec3(b.velocity), to_vec3(a.velocity))
+    distance = norm(offset)
+    if distance == 0.0 or distance - a.radius - b.radius > norm(velocity) * duration:
+        return 0.0
+    turning = norm(load_vec3(spin, i)) * a.radius + norm(load_vec3(spin, j)) * b.radius
+    # What is large is met beside its middle.
+    straight = norm(velocity) if j >= system.particles else max(-dot(velocity, offset) / distance, 0.0)
+    return straight + turning
+
+
+@kernel
+def _approach_to_plane(system, spin, i, j, duration):
+    """How fast a particle nears a half-space that it may meet in a time [s], 0 if it does not."""
+    a, b = system.body[i], system.body[j]
+    outward, level = half_space_plane(system.shapes, placed(b))
+    inward = scale(outward, -1.0)
+    offset = sub(to_vec3(a.position), to_vec3(b.position))
+    room = -dot(inward, offset) - level - a.radius
+    of_plane = add(to_vec3(b.velocity), cross(load_vec3(spin, j), offset))
+    speed = dot(inward, sub(to_vec3(a.velocity), of_plane))
+    return speed if speed > 0.0 and room <= speed * duration else 0.0
+
+
+@entry_kernel
+def expected_changes(system, neighbours, spin, duration, gain):
+    """By how much the surface velocity of each body may change in a step (n,) [m/s]: by ``gain``, or as others push.
+
+    Of obstacles it does as they swing.
     """
-    system, spin = without_refcounts((system, spin))
-    speed = np.zeros(len(system.body))
-    for i in range(len(speed)):
-        b = system.body[i]
-        speed[i] = norm(to_vec3(b.velocity))
-        if i < system.bounded:
-            speed[i] += norm(load_vec3(spin, i)) * b.radius
-        if b.kind == KINEMATIC:
-            speed[i] += largest_acceleration(system, b) * duration
-    return speed
+    system, neighbours, spin = without_refcounts((system, neighbours, spin))
+    change = np.zeros(len(system.body))
+    for j in range(system.particles, len(system.body)):
+        if system.body[j].kind == KINEMATIC:
+            change[j] = largest_acceleration(system, system.body[j]) * duration
+    for i in range(system.particles):
+        place = neighbours.place[i]
+        for near in range(neighbours.start[place], neighbours.start[place + 1]):
+            j = neighbours.body[neighbours.other[near]]
+            share = CHANGE_HANDED_ON if j < system.particles else 1.0
+            change[i] = max(change[i], share * _approach(system, spin, i, j, duration))
+        for j in range(system.bounded, len(system.body)):
+            change[i] = max(change[i], _approach_to_plane(system, spin, i, j, duration))
+        change[i] += gain
+    return change
+
+
+@kernel
+def _rotation_rate(b, then, duration):
+    """The constant angular velocity [rad/s] that turns a body to where it is ahead, to third order in the angle."""
+    half = quat_multiply(to_quat(then.orientation), conjugate(to_quat(b.orientation)))
+    return scale((half[1], half[2], half[3]), math.copysign(2.0 / duration, half[0]))
 
 
 @entry_kernel
-def expected_speeds(speed, neighbours, gain):
-    """How fast surfaces that move at ``speed`` (n,) may become [m/s]: faster by ``gain``, or as neighbours push."""
-    speed, neighbours = without_refcounts((speed, neighbours))
-    expected = speed.copy()
-    for p in range(len(neighbours.body)):
-        i = neighbours.body[p]
-        for near in range(neighbours.start[p], neighbours.start[p + 1]):
-            expected[i] = max(expected[i], SPEED_HANDED_ON * speed[neighbours.body[neighbours.other[near]]])
-        expected[i] += gain
-    return expected
+def changes_ahead(system, spin, duration, member, ahead):
+    """By how much surface velocities of members change in a step of ``duration`` [s] (n,) [m/s], 0 of all others.
+
+    What is pushed apart or held back does not go as its velocity says: what counts is the larger of both changes.
+    """
+    system, spin, member, ahead = without_refcounts((system, spin, member, ahead))
+    change = np.zeros(len(system.body))
+    for i in member:
+        b, then = system.body[i], ahead[i]
+        velocity, turning = to_vec3(b.velocity), load_vec3(spin, i)
+        gone = scale(sub(to_vec3(then.position), to_vec3(b.position)), 1.0 / duration)
+        straight = max(norm(sub(to_vec3(then.velocity), velocity)), norm(sub(gone, velocity)))
+        turned = sub(_rotation_rate(b, then, duration), turning)
+        change[i] = straight + max(norm(sub(angular_velocity(then), turning)), norm(turned)) * b.radius
+    return change
 
 
 @entry_kernel

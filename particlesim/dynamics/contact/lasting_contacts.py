@@ -30,13 +30,13 @@ from particlesim.core.math3d import (
 from particlesim.core.math3d import to_vec3 as vec
 from particlesim.dynamics.ccd.conservative_advancement import facing_edge
 from particlesim.dynamics.ccd.time_of_impact import sized_core
+from particlesim.dynamics.contact.clearance import turning_speed
 from particlesim.dynamics.contact.contact_records import CONTACT_POINT, CONTACT_TERMS, NOBODY, OF_A, OF_B, OF_EDGES
 from particlesim.dynamics.contact.law import rest_speed, rest_threshold, restitution_of, tangent_of
 from particlesim.dynamics.settings import (
     LEVEL_VERTICES,
     LOSSLESS_REST,
     MANIFOLD_MARGIN,
-    MAX_CORRECTION,
     MAX_PARALLEL_TOLERANCE,
     MAX_TURNING_SLACK,
     MIN_EDGE_SINE,
@@ -46,6 +46,7 @@ from particlesim.dynamics.settings import (
     RESTITUTION_THRESHOLD_HEIGHT,
     SAME_NORMAL,
 )
+from particlesim.dynamics.solver_state import SolverState
 from particlesim.geometry.narrow_phase.pair import pair_manifold
 from particlesim.geometry.support import is_half_space, is_sphere
 from particlesim.model.bodies import angular_velocity_change, per_mass, placed
@@ -53,10 +54,10 @@ from particlesim.model.domain import nearest_image
 
 
 class Motion(NamedTuple):
-    """How bodies move in a step, and how fast they may become."""
+    """How bodies move at the start of a step, and by how much that may change in it."""
 
     spin: np.ndarray  # (n, 3) angular velocities [rad/s]
-    speed: np.ndarray  # (n,) bounds of surface speeds [m/s]
+    change: np.ndarray  # (n,) by how much surface velocities may change [m/s]
     duration: float  # [s]
 
 
@@ -67,6 +68,12 @@ class Search(NamedTuple):
     loose: np.ndarray  # (n,) int64, whether a body has neighbours that it must collide with as others do
     displacement: np.ndarray  # (n,) how far surfaces have come [m]
     clearance: np.ndarray  # beside ``neighbours.other``: how far apart they were, plus displacements [m]
+
+
+def new_search(state: SolverState, bodies: int) -> Search:
+    """A search that has found nothing yet."""
+    rounds, loose = np.full(bodies, -1, dtype=np.int64), np.zeros(bodies, dtype=np.int64)
+    return Search(rounds, loose, state.displacement, state.clearance)
 
 
 class _Room(NamedTuple):
@@ -140,30 +147,32 @@ def _rolling_mass(a, b):
 
 
 @kernel
-def _reach_of(system, a, b, displacement):
-    """How near two bodies come that move by a displacement against each other in the step, as contacts see it.
+def _displacement(system, motion, i, j):
+    """How far the surfaces of two bodies may move against each other in the step [m]."""
+    a, b, turning = system.body[i], system.body[j], norm(load_vec3(motion.spin, j))
+    speed = norm(sub(vec(b.velocity), vec(a.velocity))) + motion.change[i] + motion.change[j]
+    speed += turning_speed(system, motion.spin, i) + turning_speed(system, motion.spin, j)
+    if j >= system.bounded and turning > 0.0:
+        offset = nearest_image(sub(vec(a.position), vec(b.position)), system.domain[0].period)
+        speed += turning * (norm(offset) + a.radius)
+    return speed * motion.duration
+
+
+@kernel
+def reach_of(system, motion, i, j):
+    """How far bodies may be apart that may come to touch in the step, as contacts see it.
 
     Returns the largest gap and inclination of features that are a contact, and whether they rebound in full.
     """
+    a, b = system.body[i], system.body[j]
     inradius = min(a.inradius, b.inradius)
     height = RESTITUTION_THRESHOLD_HEIGHT * inradius
     if restitution_of(system, a, b) == 1.0:
         return LOSSLESS_REST * height, RESTING_PARALLEL_TOLERANCE, True
+    displacement = _displacement(system, motion, i, j)
     # A corner that is turned by so much comes down on a face within the step.
     tilt = min(max(RESTING_PARALLEL_TOLERANCE, displacement / inradius), MAX_PARALLEL_TOLERANCE)
-    return height + displacement + 2.0 * MAX_CORRECTION * inradius, tilt, False
-
-
-@kernel
-def _displacement(system, motion, i, j):
-    """How far the surfaces of two bodies may move against each other in the step [m]."""
-    a, b, turning = system.body[i], system.body[j], norm(load_vec3(motion.spin, j))
-    speed = motion.speed[i] + motion.speed[j]
-    if j >= system.bounded and turning > 0.0:
-        speed += turning * (
-            norm(nearest_image(sub(vec(a.position), vec(b.position)), system.domain[0].period)) + a.radius
-        )
-    return speed * motion.duration
+    return height + displacement, tilt, False
 
 
 @kernel
@@ -279,7 +288,7 @@ def add_contact(system, motion, pair, clear, room, found, size):
     """
     i, j = pair
     a, b = system.body[i], system.body[j]
-    reach, tilt, lossless = _reach_of(system, a, b, _displacement(system, motion, i, j))
+    reach, tilt, lossless = reach_of(system, motion, i, j)
     if clear > reach:
         return size, clear, lossless
     normal, offset, count, clear = _pair_points(system, a, b, reach, tilt, room)

@@ -97,7 +97,7 @@ def _pair_of(islands, first, depth):
 
 
 @kernel
-def _travel(system, ahead, i):
+def travel(system, ahead, i):
     """How far a body goes in the step, and the surface of what is no sphere by turning at most [m]."""
     b, then = system.body[i], ahead[i]
     shift = sub(vec(then.position), vec(b.position))
@@ -111,8 +111,8 @@ def _travel(system, ahead, i):
 @kernel
 def _may_sink(system, ahead, pair):
     """Whether bodies move so far that they may be nearer at the end than they may."""
-    shift_a, turn_a = _travel(system, ahead, pair.a)
-    shift_b, turn_b = _travel(system, ahead, pair.b)
+    shift_a, turn_a = travel(system, ahead, pair.a)
+    shift_b, turn_b = travel(system, ahead, pair.b)
     return pair.gap - norm(sub(shift_b, shift_a)) - turn_a - turn_b < pair.least
 
 

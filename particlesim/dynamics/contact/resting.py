@@ -13,8 +13,9 @@ import numpy as np
 
 from particlesim.core.parallel import ThreadTeam
 from particlesim.dynamics.contact.booking import NOTHING_BORNE, Borne
-from particlesim.dynamics.contact.clearance import add_displacements, expected_speeds, surface_speeds
+from particlesim.dynamics.contact.clearance import add_displacements, changes_ahead, expected_changes
 from particlesim.dynamics.contact.cone_solver import MOVER
+from particlesim.dynamics.contact.foreseen import unforeseen
 from particlesim.dynamics.contact.island_step import (
     Islands,
     finish,
@@ -22,18 +23,18 @@ from particlesim.dynamics.contact.island_step import (
     take_over,
     write_obstacles,
 )
-from particlesim.dynamics.contact.lasting_contacts import Motion, Search, contacts_of, resting_on_obstacles
+from particlesim.dynamics.contact.lasting_contacts import Motion, Search, contacts_of, new_search, resting_on_obstacles
 from particlesim.dynamics.contact.lasting_islands import forces_after, gathered, warm_start
 from particlesim.dynamics.contact.position_correction import place_obstacles_ahead
 from particlesim.dynamics.neighbour_list import NeighbourList
 from particlesim.dynamics.settings import (
+    CHANGE_MARGIN,
     CORRECTED_DEPTH,
     LASTING_STEP,
     MAX_CONTACT_SEARCHES,
     PAIR_COST,
     RESTING_SUBSTEPS,
     SPEED_GAIN,
-    SPEED_MARGIN,
     UNRESOLVED_VELOCITY,
 )
 from particlesim.dynamics.solver_state import SolverState
@@ -79,27 +80,29 @@ class RestingContacts:
         system, body, neighbours = self._system, self._system.body, state.neighbours
         body["resting"][: system.particles] = 0
         spin = angular_velocities(body, len(body))
-        gain = SPEED_GAIN * self._pull * duration
-        speed = expected_speeds(surface_speeds(system, spin, duration), neighbours, gain)
-        seeds = self._seeds(state, Motion(spin, speed, duration), self._fields_until - state.time)
+        change = expected_changes(system, neighbours, spin, duration, SPEED_GAIN * self._pull * duration)
+        seeds = self._seeds(state, Motion(spin, change, duration), self._fields_until - state.time)
         if not len(seeds):
             return NOTHING_BORNE
         add_displacements(system, state.seen, state.displacement)
         write_obstacles(body, self._mover, system.particles)
         place_obstacles_ahead(system, duration, self._ahead)
-        for search in range(1, MAX_CONTACT_SEARCHES + 1):
-            motion = Motion(spin, speed, duration)
-            points, terms, loose = self._contacts(state, motion, seeds)
+        for attempt in range(1, MAX_CONTACT_SEARCHES + 1):
+            motion = Motion(spin, change, duration)
+            search = new_search(state, len(body))
+            points, terms = self._contacts(neighbours, motion, search, seeds)
             islands = gathered(points, terms, seeds, system.particles)
             warm_start(islands, state.forces, len(body))
             left = self._step(islands, duration, self._fields_until - state.time)
-            reached = surface_speeds(system, angular_velocities(body, len(body)), duration)
-            foreseen = bool((reached <= SPEED_MARGIN * speed).all())
-            if foreseen or search == MAX_CONTACT_SEARCHES:
+            carried = np.arange(len(body)) >= system.particles
+            carried[islands.member] = True
+            foreseen = not unforeseen(system, neighbours, motion, search, self._ahead, carried)
+            if foreseen or attempt == MAX_CONTACT_SEARCHES:
                 break
-            np.maximum(speed, SPEED_MARGIN * reached, out=speed)
-            self.release()
-        state.standing[islands.member] = np.where(loose[islands.member] > 0, LOOSE, SETTLES)
+            found = changes_ahead(system, spin, duration, islands.member, self._ahead)
+            change = np.maximum(CHANGE_MARGIN * change, CHANGE_MARGIN * found)
+        self._take_over(islands.member)
+        state.standing[islands.member] = np.where(search.loose[islands.member] > 0, LOOSE, SETTLES)
         state.standing[system.particles :] = SETTLES
         state.forces = forces_after(islands, len(body))
         self._mark_lasting(state, islands)
@@ -119,25 +122,22 @@ class RestingContacts:
         return np.flatnonzero(rests)
 
     def _contacts(
-        self, state: SolverState, motion: Motion, seeds: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Contact points of all that may come to touch the seeds, their terms, and which bodies are loose (n,)."""
-        system, count = self._system, len(self._system.body)
-        search = Search(
-            np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64), state.displacement, state.clearance
-        )
+        self, neighbours: NeighbourList, motion: Motion, search: Search, seeds: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Contact points of all that may come to touch the seeds, and their terms."""
+        system = self._system
         parts: list[tuple[np.ndarray, np.ndarray]] = []
         indices, number = seeds, 0
         while len(indices):
             search.round[indices] = number
             team = ThreadTeam(PAIR_COST * len(indices))
-            found = team.each(partial(self._contacts_in_round, state.neighbours, motion, search, indices), len(indices))
+            found = team.each(partial(self._contacts_in_round, neighbours, motion, search, indices), len(indices))
             parts += found
             ends = np.concatenate([part[0][end] for part in found for end in ("a", "b")])
             ends = ends[ends < system.particles]
             indices = np.unique(ends[search.round[ends] < 0]).astype(np.int64)
             number += 1
-        return np.concatenate([p for p, _ in parts]), np.concatenate([t for _, t in parts]), search.loose
+        return np.concatenate([p for p, _ in parts]), np.concatenate([t for _, t in parts])
 
     def _contacts_in_round(
         self,
@@ -160,10 +160,14 @@ class RestingContacts:
             len(islands.first_point) - 1,
             4 * team.threads,
         )
-        self._member = islands.member
-        self._before = system.body[["velocity", "angular_momentum"]][islands.member]
-        take_over(system.body, islands.member, self._ahead)
         return max(left)
+
+    def _take_over(self, member: np.ndarray) -> None:
+        """Let particles (k,) go on as they move at the end of the step."""
+        body = self._system.body
+        self._member = member
+        self._before = body[["velocity", "angular_momentum"]][member]
+        take_over(body, member, self._ahead)
 
     def finish(self) -> None:
         """Put what was carried where it is at the end of the substep, after it has gone on at its velocity."""
