@@ -181,10 +181,16 @@ STICKING = 1e-9
 LEAST_SHARE = 1e-3
 
 # Where that leaves FEW_SWEEPS pairs or less, there are twice as many single sweeps as the second, along conjugate
-# ways: a large heap starts from the forces of the substep before and gets better from one to the next. So few has a
-# second answer, too, where impulses could grow for as long as they are looked for.
+# ways, in each of so many parts as the third: a large heap starts from the forces of the part before and gets better
+# from one to the next, and with half as many sweeps in twice as many parts it is held better. So few has a second
+# answer, too, where impulses could grow for as long as they are looked for.
 FEW_SWEEPS = 4
-CONJUGATE_SWEEPS = 20
+CONJUGATE_SWEEPS = 5
+LARGE_SUBSTEPS = 8
+
+# One in so many sweeps of a large heap visits all points; the others those that have pushed, and are moved. More: what
+# begins to push is found later; fewer: points that have nothing to do take time.
+SWEEPS_OF_ALL = 4
 
 # Impulses that do less together than this fraction of what each does alone cancel each other [1].
 SAME_IMPULSES = 1e-11

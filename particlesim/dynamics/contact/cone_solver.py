@@ -17,7 +17,7 @@ from particlesim.core.jit import kernel
 from particlesim.core.math3d import add, axpy, cross, dot, load_vec3, norm, scale, set_vec3, store_vec3, sub
 from particlesim.core.math3d import to_vec3 as vec
 from particlesim.core.records import record
-from particlesim.dynamics.contact.conjugate_ways import go_on, length2_of, set_out
+from particlesim.dynamics.contact.conjugate_ways import go_on, length2_of, list_point, set_out
 from particlesim.dynamics.contact.contact_records import along_normal
 from particlesim.dynamics.settings import (
     FEW_SWEEPS,
@@ -25,6 +25,7 @@ from particlesim.dynamics.settings import (
     LEAST_SHARE,
     SAME_IMPULSES,
     STICKING,
+    SWEEPS_OF_ALL,
 )
 
 # A body as the sweeps see it.
@@ -41,6 +42,7 @@ MOVER = record(
         ("trial_spin", "f8", (3,)),
         ("average", "f8", (6,)),  # velocity and angular velocity as a part of the step begins, then their means in it
         ("pull", "f8", (3,)),  # acceleration by gravity and fields [m/s^2]
+        ("stirred", "i8"),  # the last sweep that changed its velocity by what counts
         ("row", "i8"),  # its number among the members of its island, -1 of an obstacle
     ]
 )
@@ -52,12 +54,13 @@ class Sweeps(NamedTuple):
     most: int  # pairs of sweeps, up and down
     small: float  # a change of velocities that ends them [m/s]
     together: bool  # whether points are also solved together, or sweeps go on along conjugate ways
+    partly: bool  # whether most of these visit only the points that they may change
 
 
 @kernel
 def briefly(sweeps):
     """As many sweeps as are made one by one."""
-    return Sweeps(min(sweeps.most, FEW_SWEEPS), sweeps.small, False)
+    return Sweeps(min(sweeps.most, FEW_SWEEPS), sweeps.small, False, sweeps.partly)
 
 
 @kernel
@@ -305,17 +308,77 @@ def _solve_exactly(points, terms, mover, span, members, sweeps):
 
 
 @kernel
+def _visit_stirred(p, t, mover, sweep, small):
+    """Visit a contact point; returns by how much a velocity there changed. By more than ``small``, it stirs the two."""
+    a, b = mover[p.a], mover[p.b]
+    change = _visit(p, a, b)
+    if t.rolling_friction > 0.0:
+        _resist_rolling(p, t, a, b)
+    if change > small:
+        a.stirred = sweep
+        if b.row >= 0:
+            b.stirred = sweep
+    return change
+
+
+@kernel
+def _sweep_all(points, terms, mover, span, ways, sweep, small):
+    """Visit all points of a span, and list those that push; returns (largest change of a velocity, how many do)."""
+    number, count = sweep
+    change = 0.0
+    for k in range(span[0], span[1]):
+        p = points[k]
+        change = max(change, _visit_stirred(p, terms[k], mover, number, small))
+        if p.push > 0.0 and not ways.listed[k - span[0]]:
+            count = list_point(ways, span, k, count)
+    return change, count
+
+
+@kernel
+def _sweep_listed(points, terms, mover, ways, sweep, small, every):
+    """Visit every listed point, or those of bodies that this sweep or the last has stirred.
+
+    Returns the largest change of a velocity.
+    """
+    number, count = sweep
+    change = 0.0
+    for n in range(count):
+        k = ways.point[n]
+        p = points[k]
+        b = mover[p.b]
+        if every or mover[p.a].stirred >= number - 1 or (b.row >= 0 and b.stirred >= number - 1):
+            change = max(change, _visit_stirred(p, terms[k], mover, number, small))
+    return change
+
+
+@kernel
 def _solve_nearly(points, terms, mover, span, members, sweeps, ways):
-    """See ``solve``: each sweep goes on along the way of those before, as long as they get shorter."""
-    change, last = math.inf, 0.0
+    """See ``solve``: each sweep goes on along the way of those before, as long as they get shorter.
+
+    Where they visit points ``partly``, those that do not push, and those of bodies that others have left as they are,
+    have their turn now and then. All whose impulses went on have it at once: what has left its cone comes back.
+    """
+    change, last, count = math.inf, 0.0, 0
+    for k in range(span[0], span[1]):
+        ways.listed[k - span[0]] = False
+        if points[k].push > 0.0:
+            count = list_point(ways, span, k, count)
+    for i in members:
+        mover[i].stirred = -1
+    whole, went_on = True, False
     for sweep in range(2 * sweeps.most):
-        set_out(points, terms, mover, span, members, ways)
-        change = _sweep(points, terms, mover, span, True)
-        if change <= sweeps.small or sweep + 1 == 2 * sweeps.most:
+        set_out(points, terms, mover, span, members, ways, count)
+        if whole:
+            change, count = _sweep_all(points, terms, mover, span, ways, (sweep, count), sweeps.small)
+        else:
+            change = _sweep_listed(points, terms, mover, ways, (sweep, count), sweeps.small, went_on)
+        if (whole and change <= sweeps.small) or sweep + 1 == 2 * sweeps.most:
             break
-        length2 = length2_of(points, terms, span, ways)
-        go_on(points, terms, mover, span, members, ways, length2 / last if length2 < last else 0.0)
-        last = length2
+        length2 = length2_of(points, terms, span, ways, count)
+        share = length2 / last if length2 < last else 0.0
+        go_on(points, terms, mover, span, members, ways, (share, count))
+        last, went_on = length2, share > 0.0
+        whole = not sweeps.partly or change <= sweeps.small or (sweep + 1) % SWEEPS_OF_ALL == 0
     return change
 
 

@@ -15,24 +15,45 @@ from particlesim.core.jit import kernel
 
 
 class Ways(NamedTuple):
-    """Impulses and velocities at the start of a sweep, and the ways that they have taken."""
+    """Impulses and velocities at the start of a sweep, and the ways that they have taken; which points are listed."""
 
     impulse: np.ndarray  # (m, 7): push, drag and roll
     of_impulse: np.ndarray  # (m, 7)
     motion: np.ndarray  # (n, 6): velocity and angular velocity
     of_motion: np.ndarray  # (n, 6)
+    listed: np.ndarray  # (m,) bool, whether a contact point has pushed
+    point: np.ndarray  # (m,) int64, those that have
 
 
 @kernel
 def new_ways(points, members):
     """Room for so many contact points and members."""
-    return Ways(np.zeros((points, 7)), np.zeros((points, 7)), np.zeros((members, 6)), np.zeros((members, 6)))
+    return Ways(
+        np.zeros((points, 7)),
+        np.zeros((points, 7)),
+        np.zeros((members, 6)),
+        np.zeros((members, 6)),
+        np.zeros(points, dtype=np.bool_),
+        np.zeros(points, dtype=np.int64),
+    )
 
 
 @kernel
-def set_out(points, terms, mover, span, members, ways):
-    """Keep what a sweep starts from."""
-    for k in range(span[0], span[1]):
+def list_point(ways, span, k, count):
+    """Add contact point ``k``, which has not pushed yet, to the list of those that have; returns how many there are."""
+    row = k - span[0]
+    ways.listed[row] = True
+    ways.point[count] = k
+    ways.impulse[row] = 0.0
+    ways.of_impulse[row] = 0.0
+    return count + 1
+
+
+@kernel
+def set_out(points, terms, mover, span, members, ways, count):
+    """Keep what a sweep starts from; ``count`` points are listed."""
+    for n in range(count):
+        k = ways.point[n]
         p, t, row = points[k], terms[k], ways.impulse[k - span[0]]
         row[0] = p.push
         for axis in range(3):
@@ -44,10 +65,11 @@ def set_out(points, terms, mover, span, members, ways):
 
 
 @kernel
-def length2_of(points, terms, span, ways):
+def length2_of(points, terms, span, ways, count):
     """The square of what a sweep has changed, as twice a kinetic energy [J]."""
     length2 = 0.0
-    for k in range(span[0], span[1]):
+    for n in range(count):
+        k = ways.point[n]
         p, t, row = points[k], terms[k], ways.impulse[k - span[0]]
         length2 += (p.push - row[0]) ** 2 / p.normal_mass
         if p.static_friction > 0.0:
@@ -60,9 +82,14 @@ def length2_of(points, terms, span, ways):
 
 
 @kernel
-def go_on(points, terms, mover, span, members, ways, share):
-    """Go a share of the last way once more; the way of these sweeps becomes all that was gone."""
-    for k in range(span[0], span[1]):
+def go_on(points, terms, mover, span, members, ways, walk):
+    """Go a share of the last way once more; the way of these sweeps becomes all that was gone.
+
+    A ``walk`` is (the share, how many points are listed).
+    """
+    share, count = walk
+    for n in range(count):
+        k = ways.point[n]
         p, t, row, way = points[k], terms[k], ways.impulse[k - span[0]], ways.of_impulse[k - span[0]]
         on = share * way[0]
         way[0] = p.push - row[0] + on

@@ -62,6 +62,7 @@ from particlesim.dynamics.settings import (
     CONJUGATE_SWEEPS,
     FEW_SWEEPS,
     GAP_ROUNDING,
+    LARGE_SUBSTEPS,
     MAX_SWEEPS,
     MEAN_VELOCITY_ROUNDS,
     NEAR_SWEEP_CONVERGED,
@@ -127,9 +128,11 @@ def _substep(system, islands, mover, span, members, interval, sweeps, ways):
         # It bends as the square of the time: so much more than until now in this substep.
         bends = -bent * (2.0 * time / duration + 1.0) * duration * duration / (time * time) if bent < 0.0 else 0.0
         room = gap - bends
-        seek(system, p, mover, -max(room - t.slack, 0.0) / duration, time, duration)
         t.parting = min(max(-room, 0.0), bends) / duration
-        parts = parts or t.parting > 0.0
+        # Sweeps of a large heap are too few for impulses to grow in (see below): what is to part does so at once.
+        at_once = 0.0 if sweeps.together else t.parting
+        seek(system, p, mover, at_once - max(room - t.slack, 0.0) / duration, time, duration)
+        parts = parts or (sweeps.together and t.parting > 0.0)
         give(p, a, b, axpy(vec(p.drag), vec(p.normal), p.push))
         if t.rolling_friction > 0.0:
             give_turn(a, b, vec(t.roll))
@@ -255,19 +258,25 @@ def _book_island(islands, k, span, gain):
 
 
 @kernel
+def _pairs_of_sweeps(span):
+    """How many pairs of sweeps over the points of a span there is time for in a part of the step."""
+    return SWEEP_VISITS // (2 * RESTING_SUBSTEPS * max(span[1] - span[0], 1))
+
+
+@kernel
 def _limits(islands, mover, span, members, part):
     """How many sweeps the points of a span have in a ``part`` of the step [s], and when they end."""
-    fastest, visits = 0.0, 2 * RESTING_SUBSTEPS * max(span[1] - span[0], 1)
+    fastest, pairs = 0.0, _pairs_of_sweeps(span)
     least = np.inf
     for i in members:
         fastest = max(fastest, norm(vec(mover[i].pull)) * part)
     for k in range(span[0], span[1]):
         fastest = max(fastest, abs(islands.terms[k].approach))
         least = min(least, islands.terms[k].inradius)
-    few = SWEEP_VISITS // visits
-    if few > FEW_SWEEPS:
-        return Sweeps(min(few, MAX_SWEEPS), SWEEP_CONVERGED * fastest, True)
-    return Sweeps(CONJUGATE_SWEEPS, max(SWEEP_CONVERGED * fastest, NEAR_SWEEP_CONVERGED * least / part), False)
+    if pairs > FEW_SWEEPS:
+        return Sweeps(min(pairs, MAX_SWEEPS), SWEEP_CONVERGED * fastest, True, False)
+    small = max(SWEEP_CONVERGED * fastest, NEAR_SWEEP_CONVERGED * least / part)
+    return Sweeps(CONJUGATE_SWEEPS, small, False, True)
 
 
 @kernel
@@ -276,12 +285,13 @@ def _step_island(system, islands, mover, k, interval, ahead):
     span = islands.first_point[k], islands.first_point[k + 1]
     members = islands.member[islands.first_member[k] : islands.first_member[k + 1]]
     gravity, (duration, until_fields) = vec(system.domain[0].gravity), interval
-    part = duration / RESTING_SUBSTEPS
+    parts = RESTING_SUBSTEPS if _pairs_of_sweeps(span) > FEW_SWEEPS else LARGE_SUBSTEPS
+    part = duration / parts
     _begin(system, islands, mover, span, members, (until_fields, part))
     sweeps = _limits(islands, mover, span, members, part)
     ways = new_ways(span[1] - span[0], len(members))
     left = 0.0
-    for substep in range(RESTING_SUBSTEPS):
+    for substep in range(parts):
         left = _substep(system, islands, mover, span, members, (substep * part, part), sweeps, ways)
     _remember(islands, span, part)
     _mean_velocities(system, islands, mover, span, members, duration, part)
