@@ -102,7 +102,9 @@ def test_a_heap_of_all_shapes_calms_down():
     sim, ledgers, overlap = followed(heap(10), 3, 30)
     assert only_falls(ledgers)
     assert sim.ledger.kinetic < 0.02 * max(ledger.kinetic for ledger in ledgers)
-    assert overlap < 1e-4 * 0.2
+    # What still moves may be held back in what it would have sunk into; what lies may not.
+    assert overlap < 1e-3 * 0.2
+    assert sim.largest_overlap() < 1e-4 * 0.2
     assert momentum_unaccounted(sim, ledgers) < 1e-12
     assert energy_unaccounted(ledgers) < 1e-6
 
