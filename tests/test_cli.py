@@ -164,6 +164,8 @@ def test_failures_of_the_machine_are_one_line(folder, monkeypatch):
     monkeypatch.setattr("particlesim.jobs.movie.simulate", failing(OSError(28, "No space left on device", "run.gsd")))
     result = run("simulate", "scene.toml", "-q")
     assert (result.exit_code, result.output) == (1, "run.gsd: No space left on device\n")
+    monkeypatch.setattr("particlesim.jobs.movie.simulate", failing(MemoryError("Unable to allocate 8 GiB")))
+    assert run("simulate", "scene.toml", "-q").output == "out of memory: Unable to allocate 8 GiB\n"
     monkeypatch.setattr("particlesim.jobs.movie.simulate", failing(SceneError("is odd", "world", 3)))
     assert run("simulate", "scene.toml", "-q").output == "scene.toml: world = 3: is odd\n"
     assert files(folder) == ["scene.toml"]
@@ -217,6 +219,37 @@ def test_a_reader_that_leaves_is_no_error(folder):
     assert child.stderr.read() == ""
     child.stderr.close()
     child.wait(timeout=60)
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["schema"], ["check", "scene.toml"]])
+def test_what_cannot_be_printed_is_one_line(folder, arguments):
+    for unbuffered in ("", "1"):
+        with open("/dev/full", "w") as full:
+            command = [sys.executable, "-m", "particlesim", *arguments]
+            environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+            result = subprocess.run(
+                command, stdout=full, stderr=subprocess.PIPE, text=True, check=False, env=environment
+            )
+        assert (result.returncode, result.stderr) == (1, "standard output: No space left on device\n")
+
+
+def test_progress_that_nobody_reads_ends_no_run(folder):
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "particlesim", "simulate", "scene.toml", "-o", "run.gsd"]
+    with os.fdopen(writing, "w") as closed:
+        assert subprocess.run(command, stdout=subprocess.DEVNULL, stderr=closed, check=False).returncode == 0
+    assert files(folder) == ["run.gsd", "scene.toml"]
+
+
+def test_no_file_takes_the_place_of_a_closed_stream(tmp_path):
+    code = (
+        "import os, sys; from particlesim.cli.streams import open_streams; open_streams()\n"
+        f"with open({str(tmp_path / 'x')!r}, 'w') as file: print(file.fileno(), file=file)\n"
+        "print('out'); print('error', file=sys.stderr)"
+    )
+    subprocess.run(["sh", "-c", 'exec "$@" <&- >&- 2>&-', "sh", sys.executable, "-c", code], check=True)
+    assert int((tmp_path / "x").read_text()) > 2
 
 
 def test_plain_progress_lines_carry_an_estimate(capsys, monkeypatch):

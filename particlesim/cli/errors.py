@@ -11,6 +11,8 @@ from typing import NoReturn
 
 import typer
 
+from particlesim.core.atomic_write import FULL
+
 # What is said of the signals that end a program.
 _ENDED = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
 
@@ -29,10 +31,12 @@ def one_line_errors(source: Path) -> Iterator[None]:
             yield
         except SceneError as error:
             _fail_as(error, str(error if error.file else error.within(source)), 2)
-        except BrokenPipeError:  # the reader of the output has closed it; typer ends the program
-            raise
         except OSError as error:
+            if is_of_output(error):
+                raise
             _fail_as(error, _described(error), 1)
+        except MemoryError as error:
+            _fail_as(error, ": ".join(filter(None, ["out of memory", str(error)])), 1)
         except (ValueError, RuntimeError) as error:
             # Errors of other modules of ours, which need not be imported to catch them.
             if not type(error).__module__.startswith("particlesim."):
@@ -49,9 +53,14 @@ def _fail_as(error: Exception, message: str, code: int) -> NoReturn:
     fail("; ".join([message, *getattr(error, "__notes__", [])]), code)
 
 
-def _described(error: Exception) -> str:
+def is_of_output(error: OSError) -> bool:
+    """Whether it says that what is printed finds no reader, or no room: our files are named where they do not fit."""
+    return isinstance(error, BrokenPipeError) or (error.errno in FULL and error.filename is None)
+
+
+def _described(error: OSError) -> str:
     """An error of ours as it is, one of the system with the file it is about."""
-    if isinstance(error, OSError) and error.strerror:
+    if error.strerror:
         return ": ".join([str(name) for name in (error.filename,) if name] + [error.strerror])
     return str(error)
 

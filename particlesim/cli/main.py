@@ -22,6 +22,7 @@ from particlesim.cli.output import place_for
 from particlesim.cli.plot import plot
 from particlesim.cli.render import render
 from particlesim.cli.run import load, make_file
+from particlesim.cli.streams import one_line_output, open_streams
 from particlesim.cli.sweep import sweep
 from particlesim.cli.tables import print_report, print_table
 from particlesim.core.interrupts import raise_signals
@@ -84,8 +85,10 @@ def main() -> None:
     Exit code 2 for wrong input, 1 for what this machine cannot do, 3 for a drift of energy that was not allowed,
     130 for Ctrl-C, 143 and 129 for SIGTERM and SIGHUP.
     """
+    open_streams()
     raise_signals()
-    app()
+    with one_line_output():
+        app()
 
 
 @app.callback()

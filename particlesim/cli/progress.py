@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
@@ -67,7 +67,8 @@ class _Lines:
         unit = _unit_of(phase, self._unit)
         counted = f": {unit} {done} of {total}" if done else f" {total} {unit}s"
         ending = f", {_words(left)}" if left is not None and done < total else ""
-        print(f"{phase}{counted}{ending}", file=sys.stderr, flush=True)
+        with suppress(OSError):  # nobody reads it any more, which is no reason to end
+            print(f"{phase}{counted}{ending}", file=sys.stderr, flush=True)
 
 
 class _TimeLeft(ProgressColumn):

@@ -13,7 +13,7 @@ from pathlib import Path
 _TOLD = 40
 
 # Errors that say that the file does not fit where it is to go: the system does not name it.
-_FULL = errno.ENOSPC, errno.EDQUOT, errno.EFBIG
+FULL = errno.ENOSPC, errno.EDQUOT, errno.EFBIG
 
 
 @contextlib.contextmanager
@@ -39,5 +39,5 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
 
 def named(error: OSError, path: Path) -> None:
     """Let an error that says that a file does not fit where it is to go name the file that was wanted."""
-    if error.errno in _FULL:
+    if error.errno in FULL:
         error.filename = str(path)
