@@ -1,5 +1,6 @@
 """Runs that are killed go on as if they had never been; what is left of one is never lost in silence."""
 
+import errno
 import os
 import random
 import shutil
@@ -149,9 +150,14 @@ def test_a_folder_that_is_gone_is_not_said_to_be_kept(tmp_path, always):
         if done == 9:
             shutil.rmtree(partial_folder(tmp_path / "run.gsd"))
 
-    with pytest.raises(FileNotFoundError, match="there is no folder") as error:
+    with pytest.raises(FileNotFoundError, match=r"run.gsd: what was done of it is gone, with ") as error:
         ps.simulate(some(), tmp_path / "run.gsd", progress=take_away)
     assert not hasattr(error.value, "__notes__") and not list(tmp_path.iterdir())
+
+
+def test_an_error_of_another_file_keeps_its_name(tmp_path):
+    with pytest.raises(OSError, match="else"):
+        ps.simulate(some(), tmp_path / "run.gsd", progress=stopped(3, OSError(errno.ENOSPC, "full", "/else")))
 
 
 def test_a_second_run_of_the_same_output_is_refused(tmp_path):
@@ -203,6 +209,12 @@ def is_ffmpeg_of_ours(process):
         return "ffmpeg" in name and int(rest.split()[1]) == os.getpid()
     except OSError:
         return False
+
+
+def test_what_killed_runs_left_of_a_segment_goes(tmp_path):
+    (tmp_path / "000000.1.part").write_text("torn")
+    with segments.Segments(tmp_path, 30.0, (32, 32), 18):
+        assert not list(tmp_path.iterdir())
 
 
 def test_segments_are_as_long_as_pictures_say_not_the_clock(tmp_path):

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
 
-from particlesim.core.atomic_write import atomic_write, named
+from particlesim.core.atomic_write import atomic_write
 from particlesim.core.output_path import partial_folder
 from particlesim.simulation.simulation import Simulation
 from particlesim.simulation.soundness import SimulationError
@@ -76,17 +76,23 @@ class PartialRun:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        gone = not self.folder.exists()
         if error is None or self.kept is None:
             shutil.rmtree(self.folder, ignore_errors=True)
         os.close(self._lock)
-        if isinstance(error, OSError):
-            named(error, self._path)
+        if gone and isinstance(error, Exception):
+            raise FileNotFoundError(f"{self._path}: what was done of it is gone, with {self.folder}") from error
+        if isinstance(error, OSError) and (error.filename is None or self._is_ours(error.filename)):
+            error.filename = str(self._path)
         if error is not None and self.kept is not None and (self.folder / _INDEX).exists():
             where = f"kept in {partial_folder(self._path)}"
             if isinstance(error, SimulationError):
                 error.add_note(f"{_frames(self.kept)}, those before that, are {where}")
             else:
                 error.add_note(f"{_frames(self.kept)} are {where}; --resume goes on with them")
+
+    def _is_ours(self, file: str) -> bool:
+        return Path(file).absolute().is_relative_to(self.folder)
 
     @property
     def state(self) -> Path | None:

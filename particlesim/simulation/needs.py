@@ -65,6 +65,11 @@ def _check_disk(path: Path, needed: float) -> None:
     free = shutil.disk_usage(path.parent).free + kept
     if needed > free:
         raise OutputError(
-            f"{path}: takes {needed / 1e9:,.1f} GB on the disk, of which {free / 1e9:,.1f} GB are free: "
+            f"{path}: takes {_size(needed)} on the disk, of which {_size(free)} are free: "
             "fewer frames or particles, smaller pictures, or another folder"
         )
+
+
+def _size(count: float) -> str:
+    """So many bytes, in words."""
+    return f"{count / 1e9:,.1f} GB" if count >= 1e9 else f"{count / 1e6:,.1f} MB"

@@ -45,6 +45,8 @@ class Segments:
         self._pictures: BinaryIO | None = None  # of the segment that is open
         self.sent, self._first = sent, first
         self.seconds = 0.0  # spent encoding
+        for part in folder.glob("*.part"):  # of runs that were killed
+            part.unlink()
         if sent % SEGMENT and not self._segment(sent // SEGMENT).exists():
             self._open(sent // SEGMENT, sent % SEGMENT)
 
