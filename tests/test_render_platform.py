@@ -1,6 +1,7 @@
 """Which OpenGL is chosen, and what is said when there is none."""
 
 import os
+import re
 import subprocess
 import sys
 from functools import partial
@@ -13,6 +14,7 @@ from particlesim.rendering import RenderError
 from particlesim.rendering.gl import platform
 from particlesim.rendering.gl.probe import load_folder
 from particlesim.scene import Scene
+from tests.worlds import gas
 
 DRAW = """
 import numpy as np
@@ -205,6 +207,35 @@ def test_a_folder_without_the_library_says_so(tmp_path):
         load_folder(str(tmp_path), "libOSMesa")
     with pytest.raises(OSError, match="No such file"):
         load_folder(str(tmp_path / "nowhere"), "libOSMesa")
+
+
+def test_an_ffmpeg_that_is_none_is_named_before_any_work(monkeypatch, tmp_path):
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", sys.executable)
+    working = []
+    with pytest.raises(RenderError, match=f"{re.escape(sys.executable)} .*(is not ffmpeg|does not run)"):
+        movie.render(gas(3), tmp_path / "a.mp4", progress=lambda *told: working.append(told))
+    assert not working and not list(tmp_path.iterdir())
+
+
+def test_a_context_that_is_lost_is_one_line(monkeypatch, tmp_path):
+    from particlesim.rendering.gl import pyrender_bridge  # noqa: PLC0415  (OpenGL's platform is chosen first)
+
+    draw, pictures = pyrender_bridge.Canvas.draw, []
+
+    def lose(canvas, picture):
+        pictures.append(picture)
+        if len(pictures) == 4:
+            lost = pyrender_bridge.OpenGL.error.GLError(err=0x0507)  # GL_CONTEXT_LOST
+            monkeypatch.setattr(canvas._context, "make_current", lambda: raised(lost))
+        return draw(canvas, picture)
+
+    monkeypatch.setattr(pyrender_bridge.Canvas, "draw", lose)
+    with pytest.raises(RenderError, match=r"OpenGL \(.*\) gives no picture of \(64, 64\): GLError.* 1287"):
+        movie.render(gas(3, movie={"resolution": [64, 64]}), tmp_path / "a.mp4")
+
+
+def raised(error):
+    raise error
 
 
 def test_descriptions_are_one_line():

@@ -128,7 +128,7 @@ def render(
     Raises
     ------
     RenderError
-        If this machine cannot draw, found out before any work, or cannot encode.
+        If this machine cannot draw or cannot encode, found out before any work, or can no longer.
     TrajectoryError
         If the source is a file that is no trajectory, or damaged.
     ValueError
@@ -141,6 +141,7 @@ def render(
     with opened(source) as movable, PartialRun(path, task_of(movable, look, frames, shard), resume) as run:
         part = None if shard is None else part_of(movable, frames, shard)
         platform.choose()
+        platform.describe_ffmpeg()  # which fails now, if it does, and not when all is simulated
         _compile(movable, look, progress)
         chosen = frame_source(movable, frames, threads, progress, run, part)
         scene = look or chosen.scene

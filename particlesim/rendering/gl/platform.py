@@ -136,13 +136,16 @@ def _why(found: Platform) -> str:
 
 
 def describe_ffmpeg() -> str:
-    """One line on the ffmpeg that movies are encoded with. RenderError if there is none."""
+    """One line on the ffmpeg that movies are encoded with. RenderError if there is none, or if it does not run."""
     path = ffmpeg()
     try:
         answer = subprocess.run([path, "-version"], capture_output=True, text=True, timeout=_PATIENCE, check=True)
     except (OSError, subprocess.SubprocessError) as error:
         raise RenderError(f"{path} does not run ({_one_line(str(error))})") from error
-    return f"{path}, {answer.stdout.splitlines()[0].split(' Copyright')[0]}"
+    first = answer.stdout.partition("\n")[0]
+    if not first.startswith("ffmpeg version"):
+        raise RenderError(f"{path} is not ffmpeg: it does not say its version")
+    return f"{path}, {first.partition(' Copyright')[0]}"
 
 
 def ffmpeg() -> str:

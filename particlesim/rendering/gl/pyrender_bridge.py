@@ -11,6 +11,8 @@ import ctypes
 import importlib.util
 import sys
 import types
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -210,21 +212,32 @@ class Canvas:
         self._scene.add(pyrender.Mesh([lines]))
         # pyrender wants a camera; the one that counts comes with each picture, in the uniform block.
         self._scene.add(pyrender.PerspectiveCamera(yfov=1.0))
-        try:
+        self._what = f"OpenGL ({platform.renderer}) gives no picture of {size}"
+        with self._one_line_errors():
             self._context = _context(platform, size)
             self._context.init_context()
             self._context.make_current()
             self._renderer = _Renderer(size, samples)
+
+    @contextmanager
+    def _one_line_errors(self) -> Iterator[None]:
+        """RenderError for what a driver says that has no context to draw in, or has lost it."""
+        try:
+            yield
         except (AssertionError, OpenGL.error.Error, OSError, ValueError) as error:
             reason = " ".join(str(error).split()) or type(error).__name__
-            raise RenderError(f"OpenGL ({platform.renderer}) gives no picture of {size}: {reason}") from error
+            raise RenderError(f"{self._what}: {reason}") from error
 
     def draw(self, picture: Picture) -> np.ndarray:
-        """The picture, (height, width, 4) uint8 sRGB; as always in OpenGL, its first row is the lowest."""
+        """The picture, (height, width, 4) uint8 sRGB; as always in OpenGL, its first row is the lowest.
+
+        RenderError if the context is lost, such as that of a GPU that was taken away.
+        """
         check_process()
-        self._context.make_current()
-        self._renderer.picture = picture
-        return self._renderer.render(self._scene, RenderFlags.OFFSCREEN)
+        with self._one_line_errors():
+            self._context.make_current()
+            self._renderer.picture = picture
+            return self._renderer.render(self._scene, RenderFlags.OFFSCREEN)
 
     def close(self) -> None:
         """Give back the context and what it holds. Other canvases live on: the display is shared and stays."""
