@@ -3,6 +3,7 @@
 import errno
 import os
 import random
+import resource
 import shutil
 import signal
 
@@ -153,6 +154,26 @@ def test_a_folder_that_is_gone_is_not_said_to_be_kept(tmp_path, always):
     with pytest.raises(FileNotFoundError, match=r"run.gsd: what was done of it is gone, with ") as error:
         ps.simulate(some(), tmp_path / "run.gsd", progress=take_away)
     assert not hasattr(error.value, "__notes__") and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("room", [500, 5_000, 20_000, 40_000])
+def test_a_disk_that_is_full_is_told_of_the_output_and_gone_on_from(tmp_path, always, room):
+    ps.simulate(some(), tmp_path / "straight.gsd")
+    unlimited = resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def limit(phase, done, total):
+        if done == 9:
+            largest = max(file.stat().st_size for file in partial_folder(tmp_path / "run.gsd").iterdir())
+            resource.setrlimit(resource.RLIMIT_FSIZE, (largest + room, unlimited[1]))
+
+    try:
+        with pytest.raises(OSError, match="File too large") as error:
+            ps.simulate(some(), tmp_path / "run.gsd", progress=limit)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, unlimited)
+    assert error.value.filename == str(tmp_path / "run.gsd") and "are kept in" in error.value.__notes__[0]
+    ps.simulate(some(), tmp_path / "run.gsd", resume=True)
+    assert killed.content(tmp_path / "run.gsd") == killed.content(tmp_path / "straight.gsd")
 
 
 def test_an_error_of_another_file_keeps_its_name(tmp_path):

@@ -110,6 +110,29 @@ def cut(path: Path, frames: int) -> None:
         file.write(entries.tobytes())
 
 
+def room_in_index(path: Path, needed: int) -> int:
+    """How many more chunks the index of a GSD file has room for: at least as many as are ``needed``, made if need be.
+
+    The library makes room as well, but does not notice when it could not: on a full disk it would write what comes
+    next over frames. TrajectoryError if it is no GSD file, OSError if there is no room on the disk.
+    """
+    header, entries = _index(path)
+    used = np.count_nonzero(entries["location"])
+    if len(entries) - used >= needed:
+        return int(len(entries) - used)
+    grown = np.zeros(2 * len(entries) + needed, _ENTRY)
+    grown[:used] = entries[:used]
+    header["index_entries"] = len(grown)
+    with path.open("r+b") as file:
+        header["index_location"] = file.seek(0, os.SEEK_END)
+        file.write(grown.tobytes())
+        file.flush()
+        os.fsync(file.fileno())  # before the header says that it is there
+        file.seek(0)
+        file.write(header.tobytes())
+    return int(len(grown) - used)
+
+
 def _check_index(path: Path) -> None:
     """TrajectoryError if a file is not GSD, or if its index points to what is not in it."""
     size = os.path.getsize(path)
@@ -131,7 +154,7 @@ def _index(path: Path) -> tuple[np.ndarray, np.ndarray]:
     size = os.path.getsize(path)
     with path.open("rb") as file:
         start = file.read(_HEADER.itemsize)
-        header = np.frombuffer(start, _HEADER)[0] if len(start) == _HEADER.itemsize else None
+        header = np.frombuffer(start, _HEADER).copy()[0] if len(start) == _HEADER.itemsize else None
         if header is None or header["magic"] != _MAGIC:
             raise TrajectoryError(f"{path}: not a GSD file, or cannot be read")
         blocks = (("index", _ENTRY.itemsize), ("namelist", _NAME_BYTES))

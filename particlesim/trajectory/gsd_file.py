@@ -24,7 +24,7 @@ from particlesim.scene import Scene
 from particlesim.scene.file import stored_scene
 from particlesim.trajectory.foreign_gsd import FRAME_RATE, Foreign, check_same_particles, read_foreign
 from particlesim.trajectory.frames import Frame, Header, Ledger
-from particlesim.trajectory.gsd_chunks import Chunks, TrajectoryError, cut, reading
+from particlesim.trajectory.gsd_chunks import Chunks, TrajectoryError, cut, reading, room_in_index
 from particlesim.trajectory.gsd_ledger import ledger_log, ledger_names, read_ledger
 from particlesim.trajectory.gsd_types import display_diameters, display_types
 
@@ -52,6 +52,9 @@ _DEFAULTS: dict[str, tuple[float, ...]] = {
 _UNIT = 1e-3
 
 
+# Chunks of a frame at most: what the schema has, what we add to the first one, and the ledger.
+_CHUNKS = 32 + len(ledger_names())
+
 _OLDER = "written by an older particlesim; simulate its scene again"
 
 
@@ -59,15 +62,15 @@ class TrajectoryWriter:
     """Writes frames to a GSD file, after the first ``kept`` that are in it. A context manager."""
 
     def __init__(self, path: Path, header: Header, kept: int = 0) -> None:
-        self._header = header
+        self._path, self._header = Path(path), header
         self._box = [*json.loads(header.scene_json)["world"]["size"], 0.0, 0.0, 0.0]
         self._types, self._type_of = display_types(header)
         if kept:
             cut(path, kept)
         else:
-            Path(path).touch()  # as other files are made: GSD would keep it from all others
+            self._path.touch()  # as other files are made: GSD would keep it from all others
         self._file = gsd.hoomd.open(str(path), "r+" if kept else "w")
-        self._count = kept
+        self._count, self._room = kept, 0
 
     def __enter__(self) -> TrajectoryWriter:
         return self
@@ -81,6 +84,7 @@ class TrajectoryWriter:
 
     def append(self, frame: Frame) -> None:
         """Add a frame."""
+        self._make_room()
         header, ids = self._header, frame.ids
         out = gsd.hoomd.Frame()
         out.configuration.step = self._count
@@ -107,6 +111,16 @@ class TrajectoryWriter:
         out.log.update(_logged({**own, **ledger_log(frame.ledger)}))
         self._file.append(out)
         self._count += 1
+        self._room -= _CHUNKS
+
+    def _make_room(self) -> None:
+        """Let the index of the file have room for the next frame."""
+        if self._room < _CHUNKS:
+            self._file.close()
+            try:
+                self._room = room_in_index(self._path, _CHUNKS)
+            finally:
+                self._file = gsd.hoomd.open(str(self._path), "r+")
 
 
 class Trajectory:
