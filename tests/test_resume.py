@@ -23,6 +23,7 @@ from tests import killed
 from tests.worlds import gas
 
 SCENE = """
+title = "Left"
 duration = 2.5
 [world]
 size = [3, 3, 3]
@@ -58,7 +59,7 @@ def stopped(frames, error=KeyboardInterrupt):
 
 
 def some(**settings):
-    return gas(3, **{"duration": 2.5, "movie": {"resolution": [64, 64], "fps": 30}, **settings})
+    return gas(3, **{"title": "Left", "duration": 2.5, "movie": {"resolution": [64, 64], "fps": 30}, **settings})
 
 
 @pytest.mark.parametrize("name", ["run.gsd", "movie.mp4"])

@@ -19,7 +19,7 @@ from particlesim.rendering.video.segments import SEGMENT
 from tests.killed import content
 from tests.worlds import gas
 
-# Readouts over time, fades and a scale that is settled by the run: what a part must know of the whole.
+# Readouts over time, a title, fades and a scale that is settled by the run: what a part must know of the whole.
 SHOWN = ["time", "pressure", "energy change"]
 
 
@@ -27,7 +27,8 @@ SHOWN = ["time", "pressure", "energy change"]
 def folder(tmp_path_factory):
     """A run of 190 frames, its movie drawn at once, and its movie's three parts: 60, 60 and 70 pictures."""
     folder = tmp_path_factory.mktemp("shards")
-    some = gas(2, duration=9.45, movie={"resolution": [64, 64], "fps": 20, "fade": 1.0}, show={"readout": SHOWN})
+    movie = {"resolution": [64, 64], "fps": 20, "fade": 1.0}
+    some = gas(2, title="Parts", duration=9.45, movie=movie, show={"readout": SHOWN})
     coloured = some.model_copy(update={"particles": [g.model_copy(update={"colour": "by_speed"}) for g in some.groups]})
     ps.simulate(coloured, folder / "run.gsd")
     ps.render(folder / "run.gsd", folder / "movie.mp4")

@@ -13,10 +13,11 @@ from particlesim.jobs.frame_source import Frames, FrameSource, Progress, frames_
 from particlesim.jobs.partial_run import PartialRun
 from particlesim.jobs.summary import Summary
 from particlesim.rendering.hud.history import History
+from particlesim.rendering.hud.title import Title
 from particlesim.rendering.look import look_of
-from particlesim.rendering.shading.colour import encoded
+from particlesim.rendering.shading.environment import Environment
 from particlesim.rendering.shading.fields import is_settled_by_frames
-from particlesim.rendering.video.fade import faded, strength
+from particlesim.rendering.video.fade import faded, strength, title_strength
 from particlesim.scene import Scene
 from particlesim.setup.build import contact_laws_of
 from particlesim.simulation.soundness import SimulationError
@@ -38,6 +39,9 @@ class Pictures:
         self, source: FrameSource, scene: Scene, progress: Progress | None, run: PartialRun | None = None
     ) -> None:
         self._source, self._movie, self._progress, self._run = source, scene.movie, progress, run
+        around = Environment(scene)
+        self._background = around.background
+        self._title = Title(source.scene.title if scene.show.title else "", scene.movie.size, around.dark)
         self.summary = summary_of(scene, source.header)
         self._history = History().then(source.first.ledger)
         self.poster = np.zeros((0, 0, 3), dtype=np.uint8)  # of the movie that images() gives; a part may have none
@@ -66,23 +70,23 @@ class Pictures:
         self._drawers.__exit__(*error)
 
     def images(self, flush: Callable[[], None] = lambda: None) -> Iterator[np.ndarray]:
-        """The pictures of the movie, (h, w, 3) uint8, with its fades; all frames are taken into account on the way.
+        """The pictures of the movie, (h, w, 3) uint8, with its fades and its title; all frames are taken into account.
 
         Of a part of a movie only its pictures are given, though all frames of the movie are taken into account.
 
         ``flush`` is called when all that came before is to be kept.
         """
         movie, summary, count = self._movie, self.summary, len(self._source.wanted)
-        background = encoded(movie.background)
         while not self._ended:
             for image in self._drawers.draw(self._until_due()):
                 if summary.drawn == poster_place(count):
                     self._keep_poster(image)
                 seen = strength(summary.drawn, count, movie.fade * movie.fps)
+                titled = title_strength(summary.drawn, count, movie.fps)
                 summary.drawn += 1
                 summary.seconds["drawing"] = self._drawers.seconds
                 self._tell()
-                yield faded(image, seen, background)
+                yield self._title.over(faded(image, seen, self._background), titled)
             if self._run is not None and (self._run.due() or (self._ended and self._wrong)):
                 flush()
                 self._keep(self._run)

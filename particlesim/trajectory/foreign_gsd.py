@@ -208,5 +208,6 @@ def _scene(chunks: Chunks, names: list[str], counts: np.ndarray, box: np.ndarray
             {"name": names[k], "shape": "sphere", "count": int(counts[k]), "colour": colour} for k in present.tolist()
         ],
         movie={"fps": FRAME_RATE},
-        show={"box": True, "readout": ["time", "particles"]},
+        # Nobody gave it the title, which is the name of the file.
+        show={"box": True, "readout": ["time", "particles"], "title": False},
     )

@@ -25,12 +25,15 @@ _REMEMBERED = 256
 
 
 class Style:
-    """Letters and colours of the panels of one movie, for pictures of ``size`` (width, height), ``dark`` or light."""
+    """Letters and colours of the panels of one movie, for pictures of ``size`` (width, height), ``dark`` or light.
 
-    def __init__(self, size: tuple[int, int], dark: bool) -> None:
+    ``text``: height of the letters as a fraction of the picture's shorter side, where that is enough to be read.
+    """
+
+    def __init__(self, size: tuple[int, int], dark: bool, text: float = _TEXT) -> None:
         side = min(size)
         least = max(_SMALLEST, min(_SMALL, _LARGEST_TEXT * side))
-        self.em = max(least, _TEXT * side)  # height of the letters [pixels]
+        self.em = max(least, text * side)  # height of the letters [pixels]
         self.plate, self.strong, self.faint = _DARK if dark else _LIGHT
         self._fonts = Fonts(self.em)
         self._glyph = functools.cache(self._draw_glyph)
@@ -112,9 +115,9 @@ class Panel:
         self._colour[top : top + height, left : left + width] = colour
         self._opacity[top : top + height, left : left + width] = 1.0
 
-    def lay(self, image: np.ndarray, left: int, top: int) -> None:
-        """Lay it over a picture (h, w, 3) uint8, as far as that goes."""
+    def lay(self, image: np.ndarray, left: int, top: int, seen: float = 1.0) -> None:
+        """Lay it over a picture (h, w, 3) uint8, as far as that goes; so much of it is ``seen``, 0 .. 1."""
         below = image[top : top + self._colour.shape[0], left : left + self._colour.shape[1]]
         height, width = below.shape[:2]
-        opacity = self._opacity[:height, :width]
+        opacity = seen * self._opacity[:height, :width]
         below[:] = (below + opacity * (self._colour[:height, :width] - below) + 0.5).astype(np.uint8)

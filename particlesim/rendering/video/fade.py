@@ -12,8 +12,20 @@ def strength(number: int, total: int, frames: float) -> float:
     """
     if frames <= 0.0:
         return 1.0
-    share = min(1.0, number / frames, (total - 1 - number) / frames)
-    # Without a jerk where it begins and ends.
+    return _smooth(min(1.0, number / frames, (total - 1 - number) / frames))
+
+
+def title_strength(number: int, total: int, fps: float) -> float:
+    """How much of the title is seen over picture ``number`` of ``total``, 0 .. 1.
+
+    It goes within three seconds, or the first quarter of a shorter movie: in the last third of that time.
+    """
+    pictures = min(3.0 * fps, total // 4)
+    return _smooth(min(1.0, 3.0 * (pictures - number) / pictures)) if number < pictures else 0.0
+
+
+def _smooth(share: float) -> float:
+    """From 0 to 1 without a jerk where it begins and ends."""
     return share * share * (3.0 - 2.0 * share)
 
 
