@@ -347,4 +347,4 @@ def test_a_trajectory_is_readable_as_a_movie_is_and_says_its_times(folder):
 def test_what_the_library_shows_of_itself(folder):
     assert [name for name in dir(ps) if not name.startswith("__")] == sorted(ps.__all__)
     summary = ps.simulate(ps.load_scene("scene.toml"), "x.gsd")
-    assert repr(summary).startswith("<Summary: 4 frames, 0 drawn, 0 to 0.1 s, ")
+    assert repr(summary).startswith("<Summary of x.gsd: 4 frames, 0 drawn, 0 to 0.1 s, ")

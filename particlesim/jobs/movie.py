@@ -89,6 +89,7 @@ def simulate(
                 run.keep(summary.frames, source.total, None, summary.table())
                 raise
         os.replace(growing, path)
+    summary.path = Path(path)
     return summary
 
 
@@ -123,7 +124,7 @@ def render(
 
     Returns
     -------
-    What the run amounted to.
+    What the run amounted to; in a notebook it shows the movie.
 
     Raises
     ------
@@ -161,6 +162,7 @@ def render(
         if pictures.poster.size:
             write_image(path.with_suffix(".png"), pictures.poster, as_text(origin))
         os.replace(run.folder / "whole.mp4", path)
+    pictures.summary.path = path
     return pictures.summary
 
 
@@ -188,7 +190,7 @@ def still(
 
     Returns
     -------
-    What the run amounted to.
+    What the run amounted to; in a notebook it shows the picture.
 
     Raises
     ------
@@ -204,6 +206,7 @@ def still(
             for _ in pictures.images():
                 pass
             write_image(path, pictures.poster, as_text(provenance(chosen.header, pictures.summary, chosen.wanted)))
+    pictures.summary.path = Path(path)
     return pictures.summary
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from particlesim.core.constants import DISSIPATION
+from particlesim.jobs.display import html_of, png_of
 from particlesim.trajectory.frames import Frame, Ledger, ledger_of, ledger_table
 
 
@@ -16,7 +18,7 @@ class Summary:
 
     Energies are compared with what there was at first, or with the largest kinetic energy seen if that is more.
     ``elastic`` says that no impact may take energy, ``obstructed`` that there are obstacles or fields, or that
-    particles come and go.
+    particles come and go. A notebook shows the movie or the picture at ``path``.
     """
 
     def __init__(self, total_mass: float, gravity: Any, elastic: bool = True, obstructed: bool = False) -> None:
@@ -31,11 +33,19 @@ class Summary:
         self.largest_overlap = 0.0
         self.seconds: dict[str, float] = {}  # spent in each part, but for what was done beside another
         self.times = (0.0, 0.0)  # of the first frame and the last [s]
+        self.path: Path | None = None  # of what came of it, once that is whole
 
     def __repr__(self) -> str:
         known = f", {self.impacts:,} impacts, worst energy change {self.worst_energy_drift:.1e}" if self._last else ""
         first, last = self.times
-        return f"<Summary: {self.frames:,} frames, {self.drawn:,} drawn, {first:g} to {last:g} s{known}>"
+        of = f" of {self.path}" if self.path else ""
+        return f"<Summary{of}: {self.frames:,} frames, {self.drawn:,} drawn, {first:g} to {last:g} s{known}>"
+
+    def _repr_html_(self) -> str | None:
+        return html_of(self.path, repr(self)[1:-1]) if self.path else None
+
+    def _repr_png_(self) -> bytes | None:
+        return png_of(self.path) if self.path else None
 
     def table(self) -> dict[str, Any]:
         """What has passed as plain values."""

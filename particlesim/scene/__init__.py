@@ -53,6 +53,15 @@ class Scene(Model):
         except ValidationError as error:
             raise SceneError(*explain(error, table, Scene)) from None
 
+    def __repr__(self) -> str:
+        """A line: a scene may list thousands of particles."""
+        what = f"{self.number:,} particles in {len(self.groups):,} group{'s'[: len(self.groups) > 1]}"
+        x, y, z = self.world.size
+        called = f" {shown(self.title)}" if self.title else ""
+        return f"<Scene{called}: {what}, {x:g} x {y:g} x {z:g} m, {self.duration:g} s, {self.frames:,} frames>"
+
+    __str__ = __repr__
+
     @model_validator(mode="after")
     def _has_particles(self) -> Scene:
         if not self.groups:

@@ -81,6 +81,13 @@ class Model(BaseModel):
         except ValidationError as error:
             raise SceneError(*explain(error, {name: value}, type(self))) from None
 
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        """What a table is shown with: the keys that say something, which ``kind`` does and the usual values do not."""
+        for name, field in type(self).model_fields.items():
+            value = getattr(self, name)
+            if field.is_required() or value != field.get_default(call_default_factory=True):
+                yield name, value
+
 
 # 'from' is a word of Python, which no class can have for a field.
 _SPAN: dict[str, Any] = {"from": (NotNegative, 0.0), "until": (Positive | None, None)}

@@ -73,6 +73,12 @@ class Simulation:
         self.steps = 0
         self.time_step = self.next_time_step()
 
+    def __repr__(self) -> str:
+        done = (
+            f"{self.time:g} of {self.scene.duration:g} s, {self.steps:,} steps, {self._solver.counts.impacts:,} impacts"
+        )
+        return f"<Simulation: {self.model.system.particles:,} particles, {done}, {self.broad_phase}>"
+
     # ---- checkpoints -------------------------------------------------------------------------------------------------
 
     def save(self, path: str | Path) -> None:

@@ -41,6 +41,14 @@ class Ledger:
     removed: int | None = None  # and that sinks took out
     waiting: int | None = None  # particles that emitters have not found room for yet
 
+    def __repr__(self) -> str:
+        kinetic = f"kinetic {self.kinetic:.6g} J ({self.kinetic_rotational:.6g} of rotation)"
+        px, py, pz = self.momentum
+        return (
+            f"<Ledger at {self.time:g} s: {kinetic}, potential {self.potential:.6g} J, "
+            f"momentum [{px:.3g}, {py:.3g}, {pz:.3g}] kg m/s, {self.impacts:,} impacts>"
+        )
+
     @property
     def kinetic(self) -> float:
         """Translational and rotational kinetic energy [J]."""
@@ -108,6 +116,10 @@ class Header:
     inertia: np.ndarray
     obstacles: tuple[Shape, ...] = ()
 
+    def __repr__(self) -> str:
+        names = ", ".join(shape.name for shape in self.shapes)
+        return f"<Header: {len(self.shape):,} particles ({names}), {self.mass.sum():.6g} kg>"
+
     def of(self, frame: Frame) -> Header:
         """The header of the particles of a frame alone."""
         if frame.present is None:
@@ -156,6 +168,9 @@ class Frame:
     impacts: np.ndarray
     ledger: Ledger | None = None
     present: np.ndarray | None = None
+
+    def __repr__(self) -> str:
+        return f"<Frame at {self.time:g} s: {len(self.position):,} particles>"
 
     @property
     def ids(self) -> np.ndarray:

@@ -73,13 +73,17 @@ class Chunks:
         except (OSError, RuntimeError):
             raise TrajectoryError(f"{path}: not a GSD file, or cannot be read") from None
         self.frames = int(self._file.nframes)
+        self.closed = False
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file. TrajectoryError for what is asked of it afterwards."""
         self._file.close()
+        self.closed = True
 
     def has(self, name: str, frame: int = 0) -> bool:
         """Whether a chunk is in a frame."""
+        if self.closed:  # the library would say that it has none
+            raise TrajectoryError(f"{self.path}: has been closed")
         return bool(self._file.chunk_exists(frame, name))
 
     def read(self, name: str, frame: int = 0) -> np.ndarray:

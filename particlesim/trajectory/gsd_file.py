@@ -151,6 +151,10 @@ class Trajectory:
     def __exit__(self, *_: object) -> None:
         self._chunks.close()
 
+    def __repr__(self) -> str:
+        span = "closed" if self._chunks.closed else f"{self.time(0):g} to {self.time(len(self) - 1):g} s"
+        return f"<Trajectory {self.path}: {len(self):,} frames of {len(self.header.shape):,} particles, {span}>"
+
     def __len__(self) -> int:
         return self._chunks.frames
 
