@@ -42,18 +42,21 @@ def draw_sweep(sweep: Sweep, path: Path) -> list[Path]:
 
 def draw_scene(comparison: SceneComparison, path: Path) -> list[Path]:
     """Bars: seconds of a search, tests, memory of each broad phase that ran, as SVG and PNG."""
+    from matplotlib.ticker import EngFormatter  # noqa: PLC0415  (slow to import)
+
     figure = new_figure(9.0, 3.0)
     panels = (
-        ("search_seconds", "seconds for one search"),
-        ("tested", "tested, all frames"),
-        ("memory", "bytes of memory"),
+        ("search_seconds", "time of one search", "s"),
+        ("tested", "pairs of boxes tested, all frames", ""),
+        ("memory", "memory", "B"),
     )
     names = [result.method for result in comparison.ran]
-    for axes, (value, label) in zip(figure.subplots(1, len(panels)), panels, strict=True):
+    for axes, (value, label, unit) in zip(figure.subplots(1, len(panels)), panels, strict=True):
         heights = [getattr(result, value) for result in comparison.ran]
         bars = axes.bar(names, heights, color=_bar_colours(names), width=0.6)
         # Lengths of bars are compared: they start at 0 and are in proportion; what is too short to see has its number.
-        axes.bar_label(bars, labels=[f"{height:.3g}" for height in heights], fontsize=8)
+        axes.bar_label(bars, labels=[EngFormatter(unit, places=1)(height) for height in heights], fontsize=8)
+        axes.yaxis.set_major_formatter(EngFormatter(unit))
         axes.set(title=label, ylim=(0.0, 1.12 * max(heights, default=1.0)))
         axes.title.set_size(9)
     about = f"{comparison.name}: {comparison.boxes:,} boxes, {comparison.frames} frames"
