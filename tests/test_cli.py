@@ -32,6 +32,7 @@ resolution = [64, 64]
 """
 
 TOO_LARGE = "particles[0].size = 5.0: too large: particles are 5 m thick, between walls 4 m apart"
+NUMBERED = "pictures of a movie need a place for their number"
 NO_FILE = "is not a file to write to; movies and trajectories need one"
 
 
@@ -110,9 +111,9 @@ def test_quiet_prints_nothing_and_a_missing_ending_is_added(folder):
         (["check", "run.gsd"], "run.gsd: must be a scene file (TOML)"),
         (["simulate", "scene.toml", "-o", "none/run.gsd"], "none/run.gsd: there is no folder none"),
         (["simulate", "scene.toml", "-o", "run.txt"], "run.txt: the output must end in .gsd"),
-        (["render", "scene.toml", "-o", "movie.avi"], "movie.avi: the output must end in .mp4"),
+        (["render", "scene.toml", "-o", "movie.avi"], "movie.avi: the output must end in .mp4, .webm, .gif or .png"),
         (["render", "scene.toml", "-o", "."], ".: is a folder, not a file to write to"),
-        (["render", "scene.toml", "-o", "z.gif"], "z.gif: the output must end in .mp4"),
+        (["render", "scene.toml", "-o", "z.png"], f"z.png: {NUMBERED}, such as z_%05d.png"),
         (["render", "scene.toml", "-o", "-"], f"-: {NO_FILE}"),
         (["render", "scene.toml", "-o", "/dev/null"], f"/dev/null: {NO_FILE}"),
         (["simulate", "scene.toml", "-o", "/dev/stdout"], f"/dev/stdout: {NO_FILE}"),

@@ -29,9 +29,12 @@ def no_work(monkeypatch):
 @pytest.mark.parametrize(
     ("make", "name", "words"),
     [
-        (ps.render, "z.png", "must end in .mp4"),
-        (ps.render, "z.gif", "must end in .mp4"),
-        (ps.render, "z", "must end in .mp4"),
+        (ps.render, "z.avi", "must end in .mp4, .webm, .gif or .png$"),
+        (ps.render, "z", "must end in .mp4, .webm, .gif or .png$"),
+        (ps.render, "z.png", r"pictures of a movie need a place for their number, such as .*z_%05d\.png$"),
+        (ps.render, "z_%d_%d.png", "pictures of a movie need a place for their number"),
+        (ps.render, "z_%s.png", "pictures of a movie need a place for their number"),
+        (ps.render, "poster_%d.png", "poster_0.png: is a folder, not a file to write to"),
         (ps.simulate, "z.mp4", "must end in .gsd"),
         (still, "z.mp4", "must end in .png"),
         (ps.render, "none/z.mp4", "there is no folder"),
@@ -45,6 +48,7 @@ def no_work(monkeypatch):
 def test_a_wrong_path_is_refused_in_one_line(tmp_path, no_work, make, name, words):
     (tmp_path / "folder.mp4").mkdir()
     (tmp_path / "poster.png").mkdir()
+    (tmp_path / "poster_0.png").mkdir()
     os.mkfifo(tmp_path / "pipe.mp4")
     before = sorted(tmp_path.iterdir())
     with pytest.raises(OutputError, match=words) as error:
@@ -67,13 +71,16 @@ def test_a_good_path_is_let_through_and_nothing_is_left(tmp_path):
 
 GROUP = "[world]\nsize = [4, 4, 4]\n[[particles]]\nshape = %s\ncount = %s\nsize = 0.01\n"
 MESH = '{ kind = "mesh", file = "../m.%s" }'
+NUMBERED = "pictures of a movie need a place for their number"
 TRILLION = "particles[0].count = 1000000000000: must be a whole number from 0 to 100,000,000"
 
 
 @pytest.mark.parametrize(
     ("scene", "arguments", "line"),
     [
-        ("", ["-o", "z.gif"], "z.gif: the output must end in .mp4"),
+        ("", ["-o", "z.avi"], "z.avi: the output must end in .mp4, .webm, .gif or .png"),
+        (GROUP % ('"sphere"', 1), ["-o", "z.png"], f"z.png: {NUMBERED}, such as z_%05d.png"),
+        ("", ["-o", "z.gif", "--shard", "1/2"], "z.gif: the output must end in .mp4"),
         (GROUP % ('"sphere"', 10**12), [], f"a.toml: {TRILLION}"),
         (
             "duration = 100\n" + GROUP % ('"sphere"', 10**8),

@@ -33,7 +33,8 @@ def write_movie(path, pictures, fps, size, crf=18):
     ):
         for picture in pictures:
             movie.send(picture)
-        movie.join(hidden, {})
+        movie.join({})
+        movie.appear(hidden)
     return movie
 
 

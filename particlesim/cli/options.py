@@ -21,6 +21,12 @@ def _not_negative(drift: float | None) -> float | None:
 
 
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene file (TOML).")]
+SomeFrames = Annotated[
+    str | None, typer.Option("--frames", metavar="A:B", help="Take frames A to B - 1 only; either may be left out.")
+]
+Every = Annotated[
+    str | None, typer.Option("--every", metavar="N", help="Take each Nth frame only: a movie is N times as fast.")
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Threads = Annotated[
     int | None, typer.Option("--threads", callback=_at_least_one, help="Threads to simulate with.  [default: all]")

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from particlesim.cli.errors import OptionError, one_line_errors
-from particlesim.cli.options import MaxDrift, Quiet, Resume, Threads
+from particlesim.cli.options import Every, MaxDrift, Quiet, Resume, SomeFrames, Threads
 from particlesim.cli.output import place_for
 from particlesim.cli.render_options import RenderOptions, frames_asked, scene_as_asked, shard_asked, still_time
 from particlesim.cli.run import load, make_file
+from particlesim.core.constants import MOVIE_ENDINGS
+from particlesim.core.output_path import check_sequence
 
 if TYPE_CHECKING:
     from particlesim.scene import Scene
@@ -25,14 +27,15 @@ if TYPE_CHECKING:
 def render(
     source: Annotated[Path, typer.Argument(metavar="SCENE|TRAJECTORY", help="A scene file or a .gsd trajectory.")],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The movie, or the picture.  [default: renders/NAME.mp4]")
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="The movie (.mp4, .webm, .gif, or NAME_%05d.png), or the picture.  [default: renders/NAME.mp4]",
+        ),
     ] = None,
-    frames: Annotated[
-        str | None, typer.Option("--frames", metavar="A:B", help="Draw frames A to B - 1 only; either may be left out.")
-    ] = None,
-    every: Annotated[
-        str | None, typer.Option("--every", metavar="N", help="Draw each Nth frame only: the movie is N times as fast.")
-    ] = None,
+    frames: SomeFrames = None,
+    every: Every = None,
     still: Annotated[
         str | None, typer.Option("--still", metavar="T", help="Make one picture (PNG), of the time T in seconds.")
     ] = None,
@@ -68,19 +71,22 @@ def render(
 ) -> None:
     """Simulate a scene, or read a trajectory, and make a movie of it, with a poster (PNG) beside it."""
     options = RenderOptions(frames, every, still, shard, look, quality, size, camera, colour, scale)
-    suffix, beside = (".mp4", (".png",)) if still is None else (".png", ())
+    beside = (".png",) if still is None else ()
+    endings = MOVIE_ENDINGS[: 1 if shard else None] if still is None else (".png",)
     with (
         one_line_errors(source),
-        place_for(output, _named(source, shard_asked(options)), suffix, beside=beside) as path,
+        place_for(output, _named(source, shard_asked(options)), *endings, beside=beside) as path,
         _opened(source, options, quiet) as (subject, scene, total),
     ):
         time = still_time(scene.duration, options)
         if time is not None and resume:
             raise OptionError("--resume: of a movie, not of the one picture that --still asks for")
-        chosen = None if time is not None else frames_asked(total, options)
+        chosen = None if time is not None else frames_asked(total, frames, every)
         from particlesim.simulation.needs import check_movie  # noqa: PLC0415
 
         check_movie(scene, path, 1 if chosen is None else len(chosen), simulated=subject is scene)
+        if chosen is not None:
+            check_sequence(path, len(chosen))
         from particlesim.jobs import movie  # noqa: PLC0415
 
         if time is None:

@@ -57,19 +57,19 @@ def scene_as_asked(scene: Scene, options: RenderOptions, *, of_trajectory: bool)
     return scene
 
 
-def frames_asked(total: int, options: RenderOptions) -> range:
+def frames_asked(total: int, frames: str | None, every: str | None) -> range:
     """Numbers of the frames to draw, of ``total``. OptionError if there are none, or if the values say nothing."""
     start = stop = None
-    if options.frames is not None:
-        match = re.fullmatch(r"\s*(-?\d*)\s*:\s*(-?\d*)\s*", options.frames)
+    if frames is not None:
+        match = re.fullmatch(r"\s*(-?\d*)\s*:\s*(-?\d*)\s*", frames)
         if not match or "-" in match.groups():
             allowed = "must be A:B, from frame A up to but without frame B; either may be left out"
-            raise OptionError(f"--frames {options.frames}: {allowed}")
+            raise OptionError(f"--frames {frames}: {allowed}")
         start, stop = (int(text) if text else None for text in match.groups())
-    step = 1 if options.every is None else _whole("--every", options.every)
+    step = 1 if every is None else _whole("--every", every)
     chosen = range(total)[start:stop:step]
     if not chosen:
-        raise OptionError(f"--frames {options.frames}: there are none; the frames are 0 to {total - 1:,}")
+        raise OptionError(f"--frames {frames}: there are none; the frames are 0 to {total - 1:,}")
     return chosen
 
 

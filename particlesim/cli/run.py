@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from particlesim.cli.errors import fail
 from particlesim.cli.tables import print_summary
+from particlesim.core.constants import MOVIE_ENDINGS
 
 if TYPE_CHECKING:
     from particlesim.jobs.summary import Summary
@@ -18,7 +19,7 @@ def load(source: Path) -> Scene:
     """The scene of a file. SceneError if it is wrong."""
     from particlesim.scene.file import SceneError, load_scene  # noqa: PLC0415
 
-    if source.suffix.lower() in (".gsd", ".mp4"):
+    if source.suffix.lower() in (".gsd", *MOVIE_ENDINGS):
         raise SceneError("must be a scene file (TOML)", file=source)
     return load_scene(source)
 

@@ -35,6 +35,9 @@ SEGMENT = 60
 MESH_ENDINGS = (".stl", ".obj", ".ply")
 LARGEST_MESH = 100_000_000
 
+# Endings of movies, .png of one as numbered pictures; the first is what is written if none is named.
+MOVIE_ENDINGS = (".mp4", ".webm", ".gif", ".png")
+
 # Endings of what runs are exported to; the first is what is written if none is named.
 EXPORT_ENDINGS = (".pvd", ".glb", ".usda", ".xyz")
 

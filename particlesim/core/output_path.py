@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+
+# Where the number of a picture stands in the name of a sequence, as ffmpeg has it.
+_NUMBER = re.compile(r"%(?:0([1-9]))?d")
 
 
 class OutputError(ValueError):
@@ -43,6 +47,31 @@ def check_output(path: str | Path, *suffixes: str, beside: Sequence[str] = ()) -
             pass
     except OSError as error:
         raise OSError(f"{path}: the folder {path.parent} cannot be written to") from error
+
+
+def is_sequence(path: Path) -> bool:
+    """Whether a movie at this path is one of numbered pictures."""
+    return path.suffix.lower() == ".png"
+
+
+def picture_path(path: Path, number: int) -> Path:
+    """The path of a picture of a sequence, whose name says where its number stands: ``x_%05d.png``."""
+    return path.with_name(_NUMBER.sub(lambda found: f"{number:0{found[1] or 1}}", path.name))
+
+
+def check_sequence(path: Path, pictures: int | None = None) -> None:
+    """Refuse a sequence whose name has no place for a number, or, if it is known how many, that older pictures go on.
+
+    Anything that is no sequence passes. OutputError.
+    """
+    if not is_sequence(path):
+        return
+    if len(_NUMBER.findall(path.name)) != 1:
+        named = path.with_name(f"{path.stem}_%05d.png")
+        raise OutputError(f"{path}: pictures of a movie need a place for their number, such as {named}")
+    check_place(picture_path(path, 0))
+    if pictures is not None and (after := picture_path(path, pictures)).exists():
+        raise OutputError(f"{after}: of a longer sequence: it would seem to go on with these {pictures:,}; remove it")
 
 
 def partial_folder(path: Path) -> Path:

@@ -5,19 +5,22 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from particlesim.core.output_path import check_output
+from particlesim.core.constants import MOVIE_ENDINGS
+from particlesim.core.output_path import check_output, check_sequence, is_sequence
 from particlesim.jobs.compiling import compile_kernels
-from particlesim.jobs.frame_source import Progress, frame_source, frame_source_until, opened, tell
+from particlesim.jobs.frame_source import FrameSource, Progress, frame_source, frame_source_until, opened, tell
 from particlesim.jobs.partial_run import PartialRun
 from particlesim.jobs.pictures import Pictures, summary_of, timed
-from particlesim.jobs.provenance import as_tags, as_text, provenance
+from particlesim.jobs.provenance import as_tags, as_text, provenance, texts_of_pictures
 from particlesim.jobs.shards import part_of, shard_table
 from particlesim.jobs.summary import Summary
 from particlesim.jobs.task import task_of
 from particlesim.rendering import write_image
 from particlesim.rendering.gl import platform
+from particlesim.rendering.video.picture_files import PictureFiles
 from particlesim.rendering.video.segments import Segments
 from particlesim.scene import Scene
+from particlesim.scene.camera import Movie
 from particlesim.scene.file import load_scene
 from particlesim.simulation.needs import check_movie, check_simulation
 from particlesim.simulation.soundness import SimulationError
@@ -104,21 +107,22 @@ def render(
     progress: Progress | None = None,
     threads: int | None = None,
 ) -> Summary:
-    """Make a movie (MP4) of a scene, simulating it, or of a trajectory, as it was; and a poster (PNG) beside it.
+    """Make a movie of a scene, simulating it, or of a trajectory, as it was; and a poster (PNG) beside it.
 
     Parameters
     ----------
     source
         A scene, a trajectory, or the path of one of them (.toml, .gsd).
     path
-        The movie, which must end in .mp4; it appears when it is whole.
+        The movie, which appears when it is whole. Its ending says the format: .mp4 (H.264), .webm (VP9), .gif, or .png
+        of numbered pictures, whose name has a place for their number, such as ``x_%05d.png``; they have no poster.
     look
         Draws a trajectory as this scene says, in place of its own.
     frames
         Numbers of the frames to draw, all if None; a scene is simulated from its start to the last of them.
     shard
         (k, n): only part k of n of the movie of a trajectory, 1 the first; ``join`` makes the movie of all parts. The
-        poster lies beside the one that has its picture.
+        poster lies beside the one that has its picture. A part must be .mp4.
     resume, progress, threads
         As for ``simulate``.
 
@@ -137,8 +141,9 @@ def render(
     OutputError, PartialRunError, SceneError, SimulationError, OSError
         As for ``simulate``.
     """
-    check_output(path, ".mp4", beside=(".png",))
+    check_output(path, *(MOVIE_ENDINGS if shard is None else MOVIE_ENDINGS[:1]), beside=(".png",))
     path = Path(path)
+    check_sequence(path)
     with opened(source) as movable, PartialRun(path, task_of(movable, look, frames, shard), resume) as run:
         part = None if shard is None else part_of(movable, frames, shard)
         platform.choose()
@@ -146,24 +151,31 @@ def render(
         _compile(movable, look, progress)
         chosen = frame_source(movable, frames, threads, progress, run, part)
         scene = look or chosen.scene
-        movie = scene.movie
         check_movie(scene, path, len(chosen.wanted), chosen.trajectory is None)
+        check_sequence(path, len(chosen.wanted))
         with (
             Pictures(chosen, scene, progress, run) as pictures,
-            Segments(run.folder, movie.fps, movie.size, movie.crf, pictures.summary.drawn, chosen.begin) as segments,
+            _film(run.folder, path, scene.movie, chosen, pictures.summary.drawn) as film,
         ):
-            for image in pictures.images(segments.flush):
-                segments.send(image)
+            for image in pictures.images(film.flush):
+                film.send(image)
             origin = provenance(chosen.header, pictures.summary, chosen.drawn)
             if shard is not None and isinstance(movable, Trajectory):
                 origin["shard"] = shard_table(shard, movable, scene, chosen.wanted)
-            segments.join(run.folder / "whole.mp4", as_tags(origin))
-        pictures.summary.seconds["encoding"] = segments.seconds
-        if pictures.poster.size:
+            film.join(as_tags(origin))
+        pictures.summary.seconds["encoding"] = film.seconds
+        if pictures.poster.size and not is_sequence(path):
             write_image(path.with_suffix(".png"), pictures.poster, as_text(origin))
-        os.replace(run.folder / "whole.mp4", path)
+        film.appear(path)
     pictures.summary.path = path
     return pictures.summary
+
+
+def _film(folder: Path, path: Path, movie: Movie, source: FrameSource, sent: int) -> Segments | PictureFiles:
+    """What takes the pictures of a movie that is to be at ``path``, of which so many were sent before it was left."""
+    if is_sequence(path):
+        return PictureFiles(folder, texts_of_pictures(source.header, source.wanted), sent)
+    return Segments(folder, movie.fps, movie.size, movie.crf, sent, source.begin, path.suffix.lower())
 
 
 def still(

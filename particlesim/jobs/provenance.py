@@ -6,6 +6,7 @@ import hashlib
 import importlib.metadata
 import json
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -44,14 +45,26 @@ def provenance(header: Header, summary: Summary, frames: range) -> dict[str, Any
     ``version`` of particlesim, ``scene`` (SHA-256 of the scene as JSON), ``title``, ``seed``, ``energy_drift`` (the
     largest, as a fraction of all energy), ``frames`` (first, end, step).
     """
+    drift = {"energy_drift": summary.worst_energy_drift}
+    return {**_of_scene(header), **drift, "frames": [frames.start, frames.stop, frames.step]}
+
+
+def texts_of_pictures(header: Header, frames: range) -> Callable[[int], dict[str, str]]:
+    """What each picture of a sequence is of, by its number, as texts of its file: as a movie of its frame alone.
+
+    But for the drift of energy, which is that of a run.
+    """
+    of_scene = _of_scene(header)
+    return lambda k: as_text({**of_scene, "frames": [frames[k], frames[k] + 1, 1]})
+
+
+def _of_scene(header: Header) -> dict[str, Any]:
     scene = json.loads(header.scene_json)
     return {
         "version": importlib.metadata.version("particlesim"),
         "scene": hashlib.sha256(header.scene_json.encode()).hexdigest(),
         "title": scene["title"],
         "seed": scene["seed"],
-        "energy_drift": summary.worst_energy_drift,
-        "frames": [frames.start, frames.stop, frames.step],
     }
 
 
@@ -71,9 +84,9 @@ def read_provenance(path: str | Path) -> dict[str, Any]:
     ProvenanceError if it does not say; TrajectoryError for a damaged trajectory; OSError if it cannot be read.
     """
     path = Path(path)
-    read = {".gsd": _of_trajectory, ".mp4": _of_movie, ".png": _of_picture}.get(path.suffix.lower())
+    read = _READERS.get(path.suffix.lower())
     if read is None:
-        raise ProvenanceError(f"{path}: must be a movie (.mp4), a picture (.png) or a trajectory (.gsd)")
+        raise ProvenanceError(f"{path}: must be a movie (.mp4, .webm, .gif), a picture (.png) or a trajectory (.gsd)")
     with path.open("rb"):  # or the system says why not
         pass
     values = read(path)
@@ -120,10 +133,19 @@ def _of_movie(path: Path) -> Any:
     done = subprocess.run(command, capture_output=True, check=False)
     # One tag a line; what would end it stands behind a backslash.
     text = done.stdout.decode(errors="replace").replace("\\\n", "\n")
-    tag = next((line for line in text.split("\n") if line.startswith(f"{_TAG}=")), "")
+    tag = next((line for line in text.split("\n") if line.lower().startswith(f"{_TAG}=")), "")
     for letter in "=;#\\":
         tag = tag.replace(f"\\{letter}", letter)
-    return _parsed(tag.removeprefix(f"{_TAG}="), _TEXT)
+    return _parsed(tag[len(_TAG) + 1 :], _TEXT)
+
+
+def _of_gif(path: Path) -> Any:
+    try:
+        with Image.open(path) as image:
+            comment = image.info.get(_TAG, b"")
+            return _parsed(bytes(comment).decode(errors="replace"), _TEXT)
+    except UnidentifiedImageError:
+        raise ProvenanceError(f"{path}: not a picture") from None
 
 
 def _of_picture(path: Path) -> Any:
@@ -142,3 +164,12 @@ def _parsed(text: str, *keys: str) -> Any:
         return value
     except (ValueError, KeyError, TypeError):
         return None
+
+
+_READERS: dict[str, Callable[[Path], Any]] = {
+    ".gsd": _of_trajectory,
+    ".mp4": _of_movie,
+    ".webm": _of_movie,
+    ".gif": _of_gif,
+    ".png": _of_picture,
+}

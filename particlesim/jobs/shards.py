@@ -20,7 +20,8 @@ from particlesim.core.output_path import check_output
 from particlesim.jobs.pictures import poster_place
 from particlesim.jobs.provenance import ProvenanceError, as_tags, as_text, read_provenance
 from particlesim.rendering import write_image
-from particlesim.rendering.video.segments import SEGMENT, join_files, pictures_in
+from particlesim.rendering.video.joining import join_files, pictures_in
+from particlesim.rendering.video.segments import SEGMENT
 from particlesim.scene import Scene
 from particlesim.trajectory.gsd_file import Trajectory
 

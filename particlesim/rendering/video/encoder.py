@@ -1,4 +1,4 @@
-"""Images to a file: H.264 through ffmpeg, single images through Pillow."""
+"""Images to a file: H.264 and others through ffmpeg, single images through Pillow."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import subprocess
 import tempfile
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import NoReturn
@@ -25,8 +25,17 @@ from particlesim.rendering.gl.platform import ffmpeg
 # Images that wait for the encoder: enough to even out the two, few enough to cost little memory.
 _WAITING = 4
 
-# x264 divides its work by the number of threads, and the bytes depend on it: fixed, not the machine's.
+# Encoders divide their work by the number of threads, and the bytes depend on it: fixed, not the machine's.
 _THREADS = 4
+
+# Video players take untagged colours for those of old television; the tags say what they are.
+_YUV = ["-vf", "scale=out_color_matrix=bt709:out_range=tv:flags=bicubic+accurate_rnd+bitexact,format=yuv420p"]
+_TAGS = ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"]
+
+NO_PICTURES = "there are no frames to make a movie of"
+
+# x264 would write its settings into the file (unit type 6).
+_WITHOUT_SETTINGS = ["-bsf:v", "filter_units=remove_types=6"]
 
 
 def write_image(path: str | Path, image: np.ndarray, text: Mapping[str, str] | None = None) -> None:
@@ -47,13 +56,14 @@ def write_image(path: str | Path, image: np.ndarray, text: Mapping[str, str] | N
 class Encoder:
     """ffmpeg in a process of its own, fed by a thread, so that the next image is drawn while one is encoded.
 
-    It encodes images (height, width, 3) uint8 sRGB of ``size`` (width, height, both even) to ``path``, H.264, yuv420p.
-    The same images give the same bytes. ``close`` ends it, whatever it is at; ``seconds`` were spent encoding.
+    It encodes images (height, width, 3) uint8 sRGB of ``size`` (width, height, both even) to ``path``, an MP4 file: as
+    movies with this ``ending`` have them, or for a .gif so that nothing is lost. The same images give the same bytes.
+    ``close`` ends it, whatever it is at; ``seconds`` were spent encoding.
     """
 
-    def __init__(self, path: Path, fps: float, size: tuple[int, int], crf: int) -> None:
+    def __init__(self, path: Path, fps: float, size: tuple[int, int], crf: int, ending: str = ".mp4") -> None:
         self._size = size
-        command = _command(path, fps, size, crf)
+        command = _command(path, fps, size, _CODECS[ending](crf))
         self._log = tempfile.TemporaryFile()  # noqa: SIM115  (closed in close)
         # A session of its own: Ctrl-C is for us to handle, and ends ffmpeg from here.
         self._process = subprocess.Popen(
@@ -121,15 +131,30 @@ def failure(status: int, log: bytes) -> RenderError:
     return RenderError(f"ffmpeg {how}: {last}")
 
 
-def _command(path: Path, fps: float, size: tuple[int, int], crf: int) -> list[str]:
+def _command(path: Path, fps: float, size: tuple[int, int], codec: list[str]) -> list[str]:
     rate = str(Fraction(fps).limit_denominator(1001))
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", rate, "-i", "-"]
-    # Video players take untagged colours for those of old television; these say what they are.
-    scale = "scale=out_color_matrix=bt709:out_range=tv:flags=bicubic+accurate_rnd+bitexact,format=yuv420p"
-    tags = ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"]
-    codec = ["-c:v", "libx264", "-preset", "veryfast", "-crf", str(crf), "-threads", str(_THREADS)]
-    # No versions, dates or settings in the file (unit type 6): the same images, the same bytes.
-    bare = ["-fflags", "+bitexact", "-flags:v", "+bitexact", "-bsf:v", "filter_units=remove_types=6"]
+    # No versions or dates in the file: the same images, the same bytes.
+    bare = ["-threads", str(_THREADS), "-fflags", "+bitexact", "-flags:v", "+bitexact"]
     # A path as it is: "12:30.mp4" would be a protocol.
     target = ["-f", "mp4", f"file:{path}"]
-    return [ffmpeg(), "-y", "-v", "error", *source, "-an", "-vf", scale, *codec, *tags, *bare, *target]
+    return [ffmpeg(), "-y", "-v", "error", *source, "-an", *codec, *bare, *target]
+
+
+def _h264(crf: int) -> list[str]:
+    return [*_YUV, *_TAGS, "-c:v", "libx264", "-preset", "veryfast", "-crf", str(crf), *_WITHOUT_SETTINGS]
+
+
+def _vp9(crf: int) -> list[str]:
+    # Its rate factors go up to 63 where x264's end at 51; an average bit rate of 0 lets them alone decide. The speed is
+    # such that two cores encode about as fast as they draw.
+    constant = ["-crf", str(round(crf * 63 / 51)), "-b:v", "0"]
+    return [*_YUV, *_TAGS, "-c:v", "libvpx-vp9", *constant, "-deadline", "good", "-cpu-used", "5", "-row-mt", "1"]
+
+
+def _lossless(crf: int) -> list[str]:
+    return ["-c:v", "libx264rgb", "-preset", "ultrafast", "-qp", "0", *_WITHOUT_SETTINGS]
+
+
+# How segments of a movie are encoded at a rate factor of x264, by the ending of the whole.
+_CODECS: dict[str, Callable[[int], list[str]]] = {".mp4": _h264, ".webm": _vp9, ".gif": _lossless}

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-import subprocess
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import BinaryIO
 
@@ -12,8 +12,8 @@ import numpy as np
 
 from particlesim.core.constants import SEGMENT
 from particlesim.rendering.errors import RenderError
-from particlesim.rendering.gl.platform import ffmpeg
-from particlesim.rendering.video.encoder import Encoder, failure
+from particlesim.rendering.video.encoder import NO_PICTURES, Encoder
+from particlesim.rendering.video.joining import join_files
 
 
 class Segments:
@@ -35,12 +35,21 @@ class Segments:
         How many pictures of the movie were sent, and kept by ``flush``, before it was left.
     first : int
         The picture that a part of a movie begins with, which begins a segment.
+    ending : str
+        Of the whole movie: .mp4, .webm or .gif.
     """
 
     def __init__(
-        self, folder: Path, fps: float, size: tuple[int, int], crf: int, sent: int = 0, first: int = 0
+        self,
+        folder: Path,
+        fps: float,
+        size: tuple[int, int],
+        crf: int,
+        sent: int = 0,
+        first: int = 0,
+        ending: str = ".mp4",
     ) -> None:
-        self._folder, self._fps, self._size, self._crf = folder, fps, size, crf
+        self._folder, self._fps, self._size, self._crf, self._ending = folder, fps, size, crf, ending
         self._encoder: Encoder | None = None
         self._pictures: BinaryIO | None = None  # of the segment that is open
         self.sent, self._first = sent, first
@@ -78,18 +87,25 @@ class Segments:
         if self._pictures is not None:
             self._pictures.flush()
 
-    def join(self, path: Path, tags: Mapping[str, str]) -> None:
-        """Write the whole movie, or part, to ``path`` with these tags.
-
-        RenderError if it has no pictures or ffmpeg fails.
-        """
+    def join(self, tags: Mapping[str, str]) -> None:
+        """Make the whole movie, or part, with these tags. RenderError if it has no pictures or ffmpeg fails."""
         if self.sent == self._first:
-            raise RenderError(f"{path}: there are no frames to make a movie of")
+            raise RenderError(NO_PICTURES)
         last = (self.sent - 1) // SEGMENT
         if self._encoder is not None:
             self._close(last)
         names = [self._segment(number).name for number in range(self._first // SEGMENT, last + 1)]
-        join_files(self._folder, names, path, tags)
+        start = time.perf_counter()
+        join_files(self._folder, names, self._whole, tags)
+        self.seconds += time.perf_counter() - start
+
+    def appear(self, path: Path) -> None:
+        """Let it be where it is to go."""
+        os.replace(self._whole, path)
+
+    @property
+    def _whole(self) -> Path:
+        return self._folder / f"whole{self._ending}"
 
     def _segment(self, number: int) -> Path:
         return self._folder / f"{number:06}.mp4"
@@ -103,7 +119,7 @@ class Segments:
 
     def _open(self, number: int, kept: int = 0) -> None:
         """Begin a segment, or begin it again with the pictures of it that were kept."""
-        self._encoder = Encoder(self._part(number), self._fps, self._size, self._crf)
+        self._encoder = Encoder(self._part(number), self._fps, self._size, self._crf, self._ending)
         self._pictures = pictures = self._raw(number).open("r+b" if kept else "wb")
         width, height = self._size
         for _ in range(kept):
@@ -119,30 +135,3 @@ class Segments:
         self._encoder = self._pictures = None
         os.replace(self._part(number), self._segment(number))
         self._raw(number).unlink()
-
-
-def join_files(folder: Path, names: Sequence[str], path: Path, tags: Mapping[str, str]) -> None:
-    """Write movies in a folder, one after the other, to ``path`` with these tags. RenderError if ffmpeg fails."""
-    (folder / "segments.txt").write_text("".join(f"file {name}\n" for name in names))
-    command = ["-y", "-f", "concat", "-i", "segments.txt", "-c", "copy"]
-    for name, text in tags.items():
-        command += ["-metadata", f"{name}={text}"]
-    # Without the bit rate, which would tell of the files that it was joined from, and how often.
-    command += ["-movflags", "+faststart", "-write_btrt", "0", "-fflags", "+bitexact", "-f", "mp4"]
-    command += [f"file:{path.absolute()}"]
-    done = _ffmpeg(command, folder)
-    if done.returncode:
-        raise failure(done.returncode, done.stderr)
-
-
-def pictures_in(path: Path) -> int:
-    """How many pictures of a movie can be read, without decoding them."""
-    done = _ffmpeg(["-i", f"file:{path.absolute()}", "-c", "copy", "-f", "framecrc", "-"], path.parent)
-    # A line each; lines about all of them begin with a number sign.
-    return sum(not line.startswith(b"#") for line in done.stdout.splitlines())
-
-
-def _ffmpeg(arguments: Sequence[str], folder: Path) -> subprocess.CompletedProcess[bytes]:
-    # A session of its own: Ctrl-C is for us to handle.
-    command = [ffmpeg(), "-v", "error", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, start_new_session=True, check=False)
