@@ -216,3 +216,26 @@ class TestCommand:
         done = self.run(run[0] / "run.gsd", "-o", tmp_path / "x.usda")
         assert done.stderr == "usd-core is not installed; pip install 'particlesim[usd]' does it\n"
         assert done.exit_code == 1 and not list(tmp_path.iterdir())
+
+
+def test_some_frames_only(run, tmp_path):
+    """Of a trajectory those that are asked for, of a scene the same ones, which it is simulated for."""
+    folder, _, stored = run
+    expected = [stored[k].time for k in (1, 3)]
+    with ps.open(folder / "run.gsd") as whole:
+        ps.export(whole.scene, tmp_path / "scene.xyz", frames=range(1, 4, 2))
+    ps.export(folder / "run.gsd", tmp_path / "run.xyz", frames=range(1, 4, 2))
+    for name in ("scene.xyz", "run.xyz"):
+        assert [float(atoms.info["Time"]) for atoms in ase.io.read(tmp_path / name, ":")] == expected
+    asked = ["export", str(folder / "run.gsd"), "-q", "-o", str(tmp_path / "asked.xyz")]
+    assert CliRunner().invoke(cli.app, [*asked, "--frames", "1:", "--every", "2"]).exit_code == 0
+    assert (tmp_path / "asked.xyz").read_bytes() == (tmp_path / "run.xyz").read_bytes()
+
+
+def test_frames_that_are_not_there(run, tmp_path):
+    asked = ["export", str(run[0] / "run.gsd"), "-o", str(tmp_path / "x.xyz"), "--frames", "9:"]
+    done = CliRunner().invoke(cli.app, asked)
+    assert (done.exit_code, done.stderr) == (2, "--frames 9:: there are none; the frames are 0 to 3\n")
+    with pytest.raises(ValueError, match="frames must be some of 0 to 3, not"):
+        ps.export(run[0] / "run.gsd", tmp_path / "x.xyz", frames=range(9, 10))
+    assert not list(tmp_path.iterdir())

@@ -26,6 +26,7 @@ def export(
     source: Scene | Trajectory | str | Path,
     path: str | Path,
     *,
+    frames: range | None = None,
     progress: Progress | None = None,
     threads: int | None = None,
 ) -> list[Path]:
@@ -37,6 +38,8 @@ def export(
         A scene, a trajectory, or the path of one of them (.toml, .gsd).
     path
         Its ending says the format: .pvd (VTK), .glb (glTF), .usda (USD) or .xyz (extended XYZ).
+    frames
+        Numbers of the frames to write, all if None; a scene is simulated from its start to the last of them.
     progress, threads
         As for ``simulate``.
 
@@ -46,6 +49,8 @@ def export(
 
     Raises
     ------
+    ValueError
+        For frames that are not there.
     ExportError
         For more particles than the format holds.
     MissingExtraError
@@ -63,6 +68,6 @@ def export(
     with opened(source) as movable:
         if isinstance(movable, Scene):
             compile_kernels(movable, None, progress)
-        chosen = frame_source(movable, None, threads, progress)
+        chosen = frame_source(movable, frames, threads, progress)
         colours = fixed_colours(chosen.scene, chosen.header)
         return _WRITERS[suffix](path, Exported(chosen.scene, chosen.header, told(chosen, progress), colours))

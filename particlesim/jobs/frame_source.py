@@ -178,10 +178,11 @@ def frames_of(simulation: Simulation, first: Frame, total: int, begin: int = 0) 
 
 
 def told(source: FrameSource, progress: Progress | None) -> Iterator[Frame]:
-    """The frames of a source, told as they pass."""
+    """The wanted frames of a source; all are told as they pass."""
     for number, frame in source.frames:
         if frame is not None:
-            yield frame
+            if number in source.wanted:
+                yield frame
             tell(progress, source.phase, number + 1, source.total)
 
 
