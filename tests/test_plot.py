@@ -234,6 +234,12 @@ class TestCommand:
         assert columns.column_names == list(COLUMNS)
         assert columns["energy"].to_pylist() == [float(row["energy"]) for row in a]
 
+    def test_a_movie_has_no_numbers(self, folder):
+        (folder / "a.mp4").touch()
+        what = "a.mp4: holds pictures, not the run that they are of: give its scene (.toml) or trajectory (.gsd)\n"
+        found = self.run("a.mp4")
+        assert (found.exit_code, found.stderr) == (2, what)
+
     def test_one_panel_and_its_numbers(self, folder):
         result = self.run("scene.toml", "--what", "radial", "-o", "g.png", "--csv", "g.csv", "-q")
         assert result.exit_code == 0, result.output

@@ -19,7 +19,10 @@ def load(source: Path) -> Scene:
     """The scene of a file. SceneError if it is wrong."""
     from particlesim.scene.file import SceneError, load_scene  # noqa: PLC0415
 
-    if source.suffix.lower() in (".gsd", *MOVIE_ENDINGS):
+    if source.suffix.lower() in MOVIE_ENDINGS and source.is_file():
+        what = "holds pictures, not the run that they are of: give its scene (.toml) or trajectory (.gsd)"
+        raise SceneError(what, file=source)
+    if source.suffix.lower() == ".gsd":
         raise SceneError("must be a scene file (TOML)", file=source)
     return load_scene(source)
 

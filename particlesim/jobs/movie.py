@@ -214,7 +214,10 @@ def still(
         platform.choose()
         _compile(movable, look, progress)
         chosen = frame_source_until(time, movable, threads, progress)
-        with Pictures(chosen, look or chosen.scene, progress) as pictures:
+        scene = look or chosen.scene
+        # What a curve would show passes without being drawn, or is not read.
+        bare = scene.model_copy(update={"show": scene.show.model_copy(update={"plot": None})})
+        with Pictures(chosen, bare, progress) as pictures:
             for _ in pictures.images():
                 pass
             write_image(path, pictures.poster, as_text(provenance(chosen.header, pictures.summary, chosen.wanted)))

@@ -21,7 +21,7 @@ from particlesim.rendering.video.fade import faded, strength, title_strength
 from particlesim.scene import Scene
 from particlesim.setup.build import contact_laws_of
 from particlesim.simulation.soundness import SimulationError
-from particlesim.trajectory.frames import Frame, Header, ledger_of, ledger_table
+from particlesim.trajectory.frames import Frame, Header
 
 _T = TypeVar("_T")
 
@@ -43,7 +43,7 @@ class Pictures:
         self._background = around.background
         self._title = Title(source.scene.title if scene.show.title else "", scene.movie.size, around.dark)
         self.summary = summary_of(scene, source.header)
-        self._history = History().then(source.first.ledger)
+        self._history = History.of_movie(source.wanted, source.first.ledger, scene.show.plot is not None)
         self.poster = np.zeros((0, 0, 3), dtype=np.uint8)  # of the movie that images() gives; a part may have none
         if run is not None and run.kept:
             self._go_on(run, run.kept["values"])
@@ -128,13 +128,12 @@ class Pictures:
             self._wrong, self._simulation = error, None
 
     def _keep(self, run: PartialRun) -> None:
-        history = [ledger_table(ledger) for ledger in self._history.ledgers]
-        values = {"summary": self.summary.table(), "history": history}
+        values = {"summary": self.summary.table(), "history": self._history.table()}
         run.keep(self.summary.frames, self._source.total, self._simulation, values)
 
     def _go_on(self, run: PartialRun, values: dict[str, Any]) -> None:
         self.summary.go_on(values["summary"])
-        self._history = History(tuple(ledger_of(table) for table in values["history"]))
+        self._history = History.of_table(values["history"])
         if (run.folder / _POSTER).exists():
             self.poster = np.load(run.folder / _POSTER)
 

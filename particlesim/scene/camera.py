@@ -194,6 +194,9 @@ class Show(Model):
 
     box: Flag | None = None  # edges of the world; if not given, unless all axes are open
     cells: Flag = False  # leaves of the octree
+    plot: Annotated[Literal["energy", "momentum", "impacts"], one_of("energy", "momentum", "impacts")] | None = (
+        None  # curves over the time, which grow with the movie
+    )
     title: Flag = True  # over the opening of the movie, where the scene has one
     readout: Annotated[bool | list[str], BeforeValidator(_readout, json_schema_input_type=bool | list[_Row])] = (
         True  # which rows; true stands for time, particles, impacts and energy change

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from particlesim.rendering.camera import WHOLE, Camera, Window, frames_freely
+from particlesim.rendering.hud.curve import curve_panel
 from particlesim.rendering.hud.history import History
 from particlesim.rendering.hud.legend import legend_panels
 from particlesim.rendering.hud.panel import Panel, Style
@@ -65,12 +66,20 @@ class Overlay:
         style, size = self._style, self._look.scene.movie.size
         most = max(1, int((_READOUT * size[1] - style.margin - 2 * style.pad) / style.line))
         rows = readout_rows(self._look, frame, history)[:most]
+        legends = [*self._legends, *self._curves(frame, history)]
         if not rows:
-            return legend_places(self._legends, size, (0, 0), style.margin)
+            return legend_places(legends, size, (0, 0), style.margin)
         panel = readout_panel(rows, style)
         taken = style.margin + panel.size[0], style.margin + panel.size[1]
-        legends = legend_places(self._legends, size, taken, style.margin)
-        return [(panel, style.margin, style.margin), *legends]
+        placed = legend_places(legends, size, taken, style.margin)
+        return [(panel, style.margin, style.margin), *placed]
+
+    def _curves(self, frame: Frame, history: History) -> list[Panel]:
+        """The panel with the curves that the scene wants; none where what they show is not known."""
+        scene = self._look.scene
+        if scene.show.plot is None or frame.ledger is None:
+            return []
+        return [curve_panel(scene, history.curve_to(frame.ledger), self._style)]
 
 
 def legend_places(

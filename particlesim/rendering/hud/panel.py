@@ -102,12 +102,17 @@ class Panel:
     def write(self, text: str, left: int, top: int, *, faint: bool = False) -> None:
         """Put text on it; ``left`` and ``top`` [pixels] from its upper left corner."""
         style = self._style
-        ink = style.ink(text)[: self._colour.shape[0] - top, max(-left, 0) : self._colour.shape[1] - left, None]
+        self.stain(style.ink(text), style.faint if faint else style.strong, left, top)
+
+    def stain(self, ink: np.ndarray, colour: np.ndarray, left: int, top: int) -> None:
+        """Put ink (h, w) 0 .. 1 of an sRGB colour (3,) 0 .. 255 on it, as far as that goes."""
+        height, width = self.size
+        seen = ink[: height - top, max(-left, 0) : width - left, None]
         left = max(left, 0)
-        area = slice(top, top + ink.shape[0]), slice(left, left + ink.shape[1])
-        colour, opacity = self._colour[area], self._opacity[area]
-        colour += ink * ((style.faint if faint else style.strong) - colour)
-        np.maximum(opacity, ink, out=opacity)
+        area = slice(top, top + seen.shape[0]), slice(left, left + seen.shape[1])
+        below, opacity = self._colour[area], self._opacity[area]
+        below += seen * (colour - below)
+        np.maximum(opacity, seen, out=opacity)
 
     def fill(self, colour: np.ndarray, left: int, top: int) -> None:
         """Put a patch of sRGB colours (h, w, 3) 0 .. 255 on it, which lets nothing through."""
