@@ -12,6 +12,7 @@ from .jobs.movie import simulate as simulate
 from .jobs.movie import still as still
 from .jobs.shards import join as join
 from .jobs.sweep.run import sweep as sweep
+from .jobs.view import view as view
 from .rendering import RenderError as RenderError
 from .scene import Scene as Scene
 from .scene.file import SceneError as SceneError

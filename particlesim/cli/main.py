@@ -25,6 +25,7 @@ from particlesim.cli.run import load, make_file
 from particlesim.cli.streams import one_line_output, open_streams
 from particlesim.cli.sweep import sweep
 from particlesim.cli.tables import print_report, print_table
+from particlesim.cli.view import view
 from particlesim.core.interrupts import raise_signals
 from particlesim.core.output_path import check_output
 
@@ -233,6 +234,7 @@ def doctor() -> None:
 app.command(short_help="Simulate many cases of a scene.")(sweep)
 app.command(short_help="Draw figures of a run, and write its numbers.")(plot)
 app.command(short_help="Write a run for ParaView, Blender, OVITO and others.")(export)
+app.command(short_help="Make a page that shows a run in a browser.")(view)
 app.command(short_help="Say where a movie, a picture or a trajectory comes from.")(info)
 app.command(short_help="Show partial runs, and remove them.")(clean)
 

@@ -12,7 +12,7 @@ from particlesim.geometry.faces import triangles_of
 from particlesim.geometry.shapes import Shape
 
 # Times the faces of an icosahedron are split in four: 162 corners, which leave a sphere 1.5 % of its radius too flat.
-_SPLITS = 2
+SPLITS = 2
 
 
 class Surface(NamedTuple):
@@ -27,13 +27,13 @@ class Surface(NamedTuple):
     triangles: np.ndarray
 
 
-def surface_of(shape: Shape) -> Surface:
+def surface_of(shape: Shape, splits: int = SPLITS) -> Surface:
     """The surface of a bounded shape: exact of polyhedra, of what is round its hull with corners on the surface."""
     if shape.rounding == 0.0:
         face, corners = triangles_of(shape.faces)
         normals = np.repeat(shape.face_normals[face], 3, axis=0)
         return Surface(shape.vertices[corners].reshape(-1, 3), normals, np.arange(3 * len(corners)).reshape(-1, 3))
-    ball = np.asarray(trimesh.creation.icosphere(subdivisions=_SPLITS).vertices)
+    ball = np.asarray(trimesh.creation.icosphere(subdivisions=splits).vertices)
     points = (shape.vertices[:, None, :] + shape.rounding * ball).reshape(-1, 3)
     hull = ConvexHull(points)
     a, b, c = (points[hull.simplices[:, k]] for k in range(3))
