@@ -316,6 +316,18 @@ def test_letters_that_the_usual_font_lacks_come_from_others_or_the_group_goes_by
     assert [swatch.name for swatch in named] == ["ok", "group 2"]
 
 
+def test_texts_go_as_their_script_does():
+    """From right to left, with letters that join, and marks where they belong."""
+    style = Style((1280, 720), dark=True)
+    both, bet = style.ink("אב"), style.ink("ב")
+    inked = np.flatnonzero(bet.max(axis=0) > 0.0)
+    assert both[:, : inked[-1]] == pytest.approx(bet[:, : inked[-1]], abs=1e-6)
+    assert style.width("سلام") < 0.9 * sum(style.width(letter) for letter in "سلام")
+    plain, barred = style.ink("x"), style.ink("x\u0304")
+    assert np.flatnonzero(barred.max(axis=1))[0] < np.flatnonzero(plain.max(axis=1))[0]
+    assert style.width("x\u0304") < 1.5 * style.width("x")  # of two fonts
+
+
 def test_legends_that_do_not_fit_are_left_out():
     style = Style((100, 100), dark=False)
     panels = [Panel(style, 40, 60)] * 3

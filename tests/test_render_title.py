@@ -92,6 +92,8 @@ def test_without_letters_there_is_no_plate(text):
 def test_letters_that_no_font_has_are_left_out():
     size = 640, 360
     assert (covered(f"Gas{NO_LETTER}", size) == covered("Gas", size)).all()
+    # With the marks that they bear.
+    assert (covered(f"Gas{NO_LETTER}\u0301", size) == covered("Gas", size)).all()
 
 
 def test_lines_hold_all_words_in_order_and_are_about_as_long():

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import functools
+import math
 
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFont
 
 from particlesim.rendering.hud.fonts import Fonts, letters_of
 
@@ -56,6 +57,9 @@ class Style:
 
     def width(self, text: str) -> int:
         """How wide text is [pixels]."""
+        joining = self._fonts.joining(text)
+        if joining is not None:
+            return math.ceil(joining.getlength(text))
         return sum(self._glyph(letter)[1] for letter in letters_of(text))
 
     def can_write(self, text: str) -> bool:
@@ -64,6 +68,9 @@ class Style:
 
     def _draw_text(self, text: str) -> np.ndarray:
         """How much ink text leaves, (h, w) float32 0 .. 1."""
+        joining = self._fonts.joining(text)
+        if joining is not None:
+            return self._drawn(text, joining, self.width(text))
         glyphs = [self._glyph(letter) for letter in letters_of(text)]
         tall, wide = (max((mask.shape[axis] for mask, _ in glyphs), default=0) for axis in (0, 1))
         ink, left = np.zeros((tall, self.width(text) + wide), dtype=np.float32), 0
@@ -79,10 +86,15 @@ class Style:
         usual = self._fonts.usual
         font = self._fonts.of(letter) or usual
         advance = round(font.getlength("0" if letter.isdecimal() else letter))
-        tile = Image.new("L", (advance + round(0.3 * self.em), round(1.4 * self.em)))
+        return self._drawn(letter, font, advance), advance
+
+    def _drawn(self, text: str, font: ImageFont.FreeTypeFont, width: int) -> np.ndarray:
+        """The ink of text of one font, (h, w) float32 0 .. 1."""
+        tile = Image.new("L", (width + round(0.3 * self.em), round(1.4 * self.em)))
         # All fonts stand on the line of the usual one.
-        ImageDraw.Draw(tile).text((0, usual.getmetrics()[0]), letter, fill=255, font=font, anchor="ls")
-        return np.asarray(tile, dtype=np.float32) / 255.0, advance
+        above = self._fonts.usual.getmetrics()[0]
+        ImageDraw.Draw(tile).text((0, above), text, fill=255, font=font, anchor="ls")
+        return np.asarray(tile, dtype=np.float32) / 255.0
 
 
 class Panel:

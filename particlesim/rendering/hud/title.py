@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Callable
 
 import numpy as np
@@ -34,8 +35,7 @@ class Title:
         for height in _TEXTS:
             style = Style(size, dark, height)
             room = round(_WIDTH * size[0]) - 2 * _beside(style)
-            shown = "".join(letter for letter in text[:_LETTERS] if letter.isspace() or style.can_write(letter))
-            lines = wrapped(shown, room, style.width)
+            lines = wrapped(_writable(text[:_LETTERS], style.can_write), room, style.width)
             if len(lines) <= _FEW:
                 break
         if lines:
@@ -51,6 +51,15 @@ class Title:
         top = self._size[1] - round(_BELOW * self._size[1]) - tall
         self._panel.lay(laid, (self._size[0] - wide) // 2, top, seen)
         return laid
+
+
+def _writable(text: str, can_write: Callable[[str], bool]) -> str:
+    """What of a text there are fonts for; marks go with their letters."""
+    kept = [""]
+    for letter in unicodedata.normalize("NFC", text):
+        is_mark = unicodedata.category(letter)[0] == "M"
+        kept.append(letter if letter.isspace() or (kept[-1] if is_mark else can_write(letter)) else "")
+    return "".join(kept)
 
 
 def wrapped(text: str, room: int, width: Callable[[str], int]) -> list[str]:
