@@ -315,6 +315,18 @@ BROKEN = [
         group(count="10000", placement='"lattice"'),
         "particles[0].count = 10000: a lattice of so many points has a spacing of 0.1818 m, but the particles span 0.2 m",
     ),
+    (
+        group(placement='{ kind = "row", through = [[0, 0, 0]] }'),
+        "particles[0].placement.through = [[0, 0, 0]]: must be 2 points or more",
+    ),
+    (
+        group(placement='{ kind = "row", through = [[0, 0, 0], [1, 0, 0], [1, 0, 0]] }'),
+        "particles[0].placement.through = [[0, 0, 0], [1, 0, 0], [1, 0, 0]]: point 2 is the same as the one before",
+    ),
+    (
+        group(placement='{ kind = "row", through = [[0, 0, 0], [1, 0, 0]] }'),
+        "particles[0].placement: particle 0 starts 0.0889 m inside particle 1 of particles[0]",
+    ),
     # Ellipsoids.
     (
         group(placement=f'{{ kind = "random", region = {{ {NARROW}, form = "round" }} }}'),

@@ -293,6 +293,34 @@ def test_a_lattice_without_a_spacing_takes_the_widest(edges, count):
     assert fewer < count
 
 
+def test_a_row_is_as_far_apart_all_along_and_turns_with_its_curve():
+    """Points of a circle: so many of them that the curve through them is the circle to a part in a thousand."""
+    angles = np.linspace(0.0, 1.5 * np.pi, 25)
+    circle = np.column_stack([1.5 * np.cos(angles), 1.5 * np.sin(angles), np.full(25, -0.3)])
+    row = {"kind": "row", "through": circle.tolist()}
+    dominoes = {**spheres(61, 1.0), "shape": {"kind": "box", "edges": [0.01, 0.03, 0.05]}, "orientation": "aligned"}
+    particles = built({**dominoes, "placement": row}).particles
+    expected = np.linspace(0.0, 1.5 * np.pi, 61)
+    position = 1.5 * np.column_stack([np.cos(expected), np.sin(expected)])
+    assert np.abs(particles["position"][:, :2] - position).max() < 1e-3
+    assert np.allclose(particles["position"][:, 2], -0.3)
+    apart = np.linalg.norm(np.diff(particles["position"], axis=0), axis=1)
+    assert apart == pytest.approx(apart.mean(), rel=1e-4)
+    # One of the body axes, that of the thin edge, has the direction of the circle.
+    along = np.column_stack([-np.sin(expected), np.cos(expected), np.zeros(61)])
+    in_body = np.abs(turns(particles["orientation"]).inv().apply(along))
+    assert in_body.max(axis=1) == pytest.approx(1.0, abs=1e-5)
+    assert (in_body.argmax(axis=1) == particles["principal_inertia"].argmax(axis=1)).all()
+
+
+def test_a_row_between_two_points_is_straight_and_may_stand_upright():
+    upright = {"kind": "row", "through": [[0.5, 0.2, -1.0], [0.5, 0.2, 1.0]]}
+    particles = built({**spheres(5, 0.1), "placement": upright, "orientation": "aligned"}).particles
+    expected = np.column_stack([np.full(5, 0.5), np.full(5, 0.2), np.linspace(-1.0, 1.0, 5)])
+    assert np.allclose(particles["position"], expected, atol=1e-12)
+    assert np.allclose(particles["orientation"], (1.0, 0.0, 0.0, 0.0))
+
+
 def test_clusters_have_their_spread_and_centres():
     centres = [[-2.0, 0.0, 0.0], [3.0, 1.0, 0.0]]
     placement = {"kind": "cluster", "spread": 0.5, "centres": centres}

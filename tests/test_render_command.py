@@ -199,7 +199,7 @@ def test_a_twin_scales_rolling_friction():
 
 
 def test_a_scene_of_lists_has_no_twin():
-    with pytest.raises(ps.SceneError, match="particles: all of them are placed by lists, which cannot be scaled"):
+    with pytest.raises(ps.SceneError, match="particles: all of them are placed by lists or rows, which"):
         scaled(scene(listed("cube", {"position": (0, 0, 0)})), 0.5)
 
 

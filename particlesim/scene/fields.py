@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from particlesim.scene.base import Finite, Model, NotNegative, Positive, Vector
-from particlesim.scene.groups import Region, not_zero
+from particlesim.scene.placements import Region, not_zero
 
 
 class _InRegion(Model):

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pydantic import model_validator
 
 from particlesim.scene.base import Model, Positive, Text, Timed
-from particlesim.scene.groups import Group, RadialVelocity, RandomPlacement, Region
+from particlesim.scene.groups import Group, RadialVelocity
+from particlesim.scene.placements import RandomPlacement, Region
 
 
 class Emitter(Group, Timed):

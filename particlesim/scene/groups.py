@@ -8,10 +8,7 @@ import numpy as np
 from pydantic import (
     AfterValidator,
     BeforeValidator,
-    Discriminator,
     Field,
-    Tag,
-    WithJsonSchema,
     model_validator,
 )
 
@@ -20,8 +17,6 @@ from particlesim.core.polyhedra import POLYHEDRA
 from particlesim.scene.base import (
     MAX_COUNT,
     File,
-    Finite,
-    Fraction,
     Model,
     NotNegative,
     Number,
@@ -34,7 +29,8 @@ from particlesim.scene.base import (
     shorthand,
     whole,
 )
-from particlesim.scene.messages import hint, listed, must_be, one_of
+from particlesim.scene.messages import listed, must_be, one_of
+from particlesim.scene.placements import AnyOrientation, ListPlacement, Placement, RandomPlacement
 from particlesim.scene.surface import Surface
 
 # The scene file names polyhedra without parameters as core.polyhedra does.
@@ -155,119 +151,6 @@ Size = Annotated[
         bare=(int, float, np.number),
         table=("fixed", "value"),
         text=False,
-    ),
-]
-
-
-class Region(Model):
-    """A part of the world, from one corner to the opposite one [m]: that box, or the ellipsoid that just fits in."""
-
-    lower: Vector
-    upper: Vector
-    form: Annotated[Literal["box", "ellipsoid"], one_of("box", "ellipsoid")] = "box"
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Region:
-        if any(a >= b for a, b in zip(self.lower, self.upper, strict=True)):
-            raise ValueError("every coordinate of lower must be below that of upper")
-        return self
-
-
-class RandomPlacement(Model):
-    """Anywhere in the region (the whole world if not given) without overlap."""
-
-    kind: Literal["random"]
-    region: Region | None = None
-
-
-class LatticePlacement(Model):
-    """On a simple cubic lattice centred in the region; jitter moves particles by that fraction of the free gap."""
-
-    kind: Literal["lattice"]
-    spacing: Positive | None = None  # [m]; the widest that holds the count if not given
-    jitter: Fraction = 0.0
-    region: Region | None = None
-
-
-class ClusterPlacement(Model):
-    """In Gaussian blobs of standard deviation ``spread`` [m] about given or random centres, without overlap."""
-
-    kind: Literal["cluster"]
-    clusters: Annotated[int, Field(ge=1, le=MAX_COUNT), whole, must_be("a whole number of 1 or more")] | None = None
-    spread: Positive
-    centres: Annotated[list[Vector], Field(min_length=1)] | None = None
-    region: Region | None = None
-
-    @model_validator(mode="after")
-    def _counted(self) -> ClusterPlacement:
-        if None not in (self.centres, self.clusters) and self.clusters != len(self.centres or ()):
-            raise ValueError(f"clusters is {self.clusters}, but there are {len(self.centres or ())} in centres")
-        return self
-
-
-def not_zero(value: tuple[float, ...]) -> tuple[float, ...]:
-    if not any(value):
-        raise ValueError("must not be zero")
-    return value
-
-
-class Turn(Model):
-    """A rotation by ``angle`` [degrees] about ``axis``."""
-
-    axis: Annotated[Vector, AfterValidator(not_zero)]
-    angle: Finite
-
-
-_HOW_TURNED = "[w, x, y, z] (a quaternion), or { axis = [x, y, z], angle = degrees }"
-Quaternion = Annotated[tuple[Number, Number, Number, Number], must_be(_HOW_TURNED), AfterValidator(not_zero)]
-
-
-def _known_word(value: str) -> str:
-    words = "random", "aligned"
-    if value not in words:
-        raise ValueError(f"must be 'random', 'aligned', {_HOW_TURNED}{hint(value, words)}")
-    return value
-
-
-def _form(value: Any) -> str:
-    """How an orientation is written. The brackets tell these names from keys."""
-    return "(turn)" if isinstance(value, dict | Turn) else "(quaternion)"
-
-
-def _form_or_word(value: Any) -> str:
-    return "(word)" if isinstance(value, str) else _form(value)
-
-
-_Given = Annotated[Quaternion, Tag("(quaternion)")] | Annotated[Turn, Tag("(turn)")]
-_Word = Annotated[str, AfterValidator(_known_word), WithJsonSchema({"enum": ["random", "aligned"]})]
-Orientation = Annotated[_Given, Discriminator(_form)]
-AnyOrientation = Annotated[_Given | Annotated[_Word, Tag("(word)")], Discriminator(_form_or_word)]
-
-
-class Pose(Model):
-    """One particle of a ``list``: velocity [m/s] and spin [rad/s] override those of its group."""
-
-    position: Vector
-    orientation: Orientation = (1.0, 0.0, 0.0, 0.0)
-    velocity: Vector | None = None
-    spin: Vector | None = None
-
-
-class ListPlacement(Model):
-    """Exactly here."""
-
-    kind: Literal["list"]
-    poses: Annotated[list[Pose], Field(min_length=1)]
-
-
-_Placements = Annotated[
-    RandomPlacement | LatticePlacement | ClusterPlacement | ListPlacement, Field(discriminator="kind")
-]
-Placement = Annotated[
-    _Placements,
-    shorthand(
-        '"random", "lattice", or a table such as { kind = "cluster", spread = 0.5 }',
-        _Placements | Literal["random", "lattice"],
     ),
 ]
 

@@ -19,7 +19,8 @@ from particlesim.scene.base import (
     in_time,
     shorthand,
 )
-from particlesim.scene.groups import Orientation, Shapes, not_zero
+from particlesim.scene.groups import Shapes
+from particlesim.scene.placements import Orientation, not_zero
 from particlesim.scene.surface import Surface
 
 Direction = Annotated[Vector, AfterValidator(not_zero)]

@@ -9,13 +9,17 @@ from particlesim.scene import Scene
 from particlesim.scene.base import MAX_COUNT, Model
 from particlesim.scene.file import SceneError, parse_scene
 from particlesim.scene.flow import Emitter
-from particlesim.scene.groups import Group, ListPlacement
+from particlesim.scene.groups import Group
 from particlesim.scene.obstacles import Obstacle
+from particlesim.scene.placements import ListPlacement, RowPlacement
 from particlesim.scene.surface import Contact
 from particlesim.scene.world import World
 
 # What decides how a scene is drawn, beside the colours of its groups.
 _LOOK = "camera", "movie", "show"
+
+# Placements that say where each particle is: there is no twin of them with other numbers.
+_AS_SAID = ListPlacement, RowPlacement
 
 
 def replaced(scene: Scene, **values: Any) -> Scene:
@@ -57,11 +61,11 @@ def scaled(scene: Scene, factor: float) -> Scene:
 
     Emitters go ``factor`` times as fast. Sizes, the spacing of lattices and rolling friction are multiplied by
     factor^(-1/3); a given mass, temperatures and drag by 1 / factor, so that density, speeds, energy and pressure stay.
-    Particles of a list stay as they are. SceneError if there are no others, or too many.
+    Particles of a list or a row stay as they are. SceneError if there are no others, or too many.
     """
-    counted = [group for group in scene.groups if not isinstance(group.placement, ListPlacement)]
+    counted = [group for group in scene.groups if not isinstance(group.placement, _AS_SAID)]
     if not counted:
-        raise SceneError("all of them are placed by lists, which cannot be scaled", "particles")
+        raise SceneError("all of them are placed by lists or rows, which cannot be scaled", "particles")
     number = sum(_scaled_count(group, factor) for group in counted)
     if number > MAX_COUNT:
         raise SceneError(f"would be {number:,}; there may be up to {MAX_COUNT:,}", "particles")
@@ -70,7 +74,7 @@ def scaled(scene: Scene, factor: float) -> Scene:
         world=_rolling(scene.world, factor),
         **_grouped(
             scene,
-            [group if isinstance(group.placement, ListPlacement) else _scaled(group, factor) for group in scene.groups],
+            [group if isinstance(group.placement, _AS_SAID) else _scaled(group, factor) for group in scene.groups],
         ),
         contact=[_rolling(contact, factor) for contact in scene.contact],
         obstacles=[_rolling(obstacle, factor) for obstacle in scene.obstacles],

@@ -19,7 +19,8 @@ from particlesim.model.prescribed_motion import place_kinematic
 from particlesim.model.system import Model, System, make_system
 from particlesim.scene import Scene
 from particlesim.scene.file import SceneError
-from particlesim.scene.groups import FixedSize, Group, ListPlacement
+from particlesim.scene.groups import FixedSize, Group
+from particlesim.scene.placements import ListPlacement, RowPlacement
 from particlesim.scene.surface import WALLS
 from particlesim.setup.fields import fields_of
 from particlesim.setup.initial_motion import random_quaternions, set_in_motion
@@ -27,6 +28,7 @@ from particlesim.setup.memory import check_memory
 from particlesim.setup.obstacles import Obstacle, obstruct
 from particlesim.setup.orientations import of_body_axes, quaternion_of
 from particlesim.setup.placement import positions, unit_hint
+from particlesim.setup.rows import turned_along
 from particlesim.setup.scene_obstacles import drawn_shapes, material_of, obstacles_of
 from particlesim.setup.shape_reading import shape_of
 from particlesim.setup.space import Crowd, Space
@@ -229,6 +231,7 @@ def _orientations(
             q = random_quaternions(random, group.number)
         else:
             q = np.tile(quaternion_of(group.orientation), (group.number, 1))
+            q = turned_along(group.placement, q) if isinstance(group.placement, RowPlacement) else q
         if group.number and (listed or group.orientation != "random"):
             q = of_body_axes(q, shapes[int(particles["shape_row"][particles["group"] == g][0])])
         parts.append(q)

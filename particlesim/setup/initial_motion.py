@@ -9,13 +9,13 @@ from particlesim.scene import Scene
 from particlesim.scene.groups import (
     FixedVelocity,
     Group,
-    ListPlacement,
     Maxwell,
     RadialVelocity,
     SpinMaxwell,
     SpinUniform,
     UniformSpeed,
 )
+from particlesim.scene.placements import ListPlacement
 
 
 def random_quaternions(random: np.random.Generator, count: int) -> np.ndarray:

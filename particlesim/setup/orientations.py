@@ -8,7 +8,7 @@ import numpy as np
 
 from particlesim.core.rotations import quaternions_of, rotations_of
 from particlesim.geometry.shapes import Shape
-from particlesim.scene.groups import Turn
+from particlesim.scene.placements import Turn
 
 
 def quaternion_of(orientation: tuple[float, ...] | Turn | str) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Where particles start: at random without overlap, on a lattice, in clusters, or where a list says."""
+"""Where particles start: at random without overlap, on a lattice, in a row, in clusters, or where a list says."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ import numpy as np
 from particlesim.geometry.aabb import aabbs_of
 from particlesim.scene import Scene
 from particlesim.scene.file import SceneError
-from particlesim.scene.groups import (
+from particlesim.scene.groups import Group, MeshShape
+from particlesim.scene.placements import (
     ClusterPlacement,
-    Group,
     LatticePlacement,
     ListPlacement,
-    MeshShape,
     RandomPlacement,
     Region,
+    RowPlacement,
 )
 from particlesim.setup.overlap_relaxation import Known, push_apart
 from particlesim.setup.random_insertion import Insertion, empty_space, refile, try_in_place
+from particlesim.setup.rows import on_row
 from particlesim.setup.space import Crowd, Space
 
 # Random trials a particle before it finds no room. Equal spheres jam at a fill of 0.38 (J. Feder, J. Theor. Biol. 87
@@ -55,8 +56,8 @@ def positions(
 ) -> np.ndarray:
     """Positions of all particles of a scene, (n, 3) [m]. SceneError if a group does not fit.
 
-    Lists and lattices come first; the rest is put between them at random, the largest particles first, and not into
-    obstacles. What finds no room is put anywhere, and then all that is at random makes room for each other.
+    Lists, rows and lattices come first; the rest is put between them at random, the largest particles first, and not
+    into obstacles. What finds no room is put anywhere, and then all that is at random makes room for each other.
     """
     insertion = empty_space(crowd, world, orientation)
     position, level = insertion.body["position"], insertion.body["level"]
@@ -65,6 +66,8 @@ def positions(
     for g, (group, members) in enumerate(zip(scene.particles, groups, strict=True)):
         if isinstance(group.placement, ListPlacement):
             position[members] = [pose.position for pose in group.placement.poses]
+        elif isinstance(group.placement, RowPlacement):
+            position[members], _ = on_row(group.placement, len(members))
         elif isinstance(group.placement, LatticePlacement):
             extent = (above[members] - below[members]).max(axis=0, initial=0.0)
             position[members] = _on_lattice(g, group.placement, world, len(members), extent, randoms[g])

@@ -12,7 +12,7 @@ from particlesim.model.system import Model
 from particlesim.scene import Scene
 from particlesim.scene.file import SceneError
 from particlesim.scene.flow import Emitter
-from particlesim.scene.groups import RandomPlacement, Region
+from particlesim.scene.placements import RandomPlacement, Region
 from particlesim.setup.build import space_of
 from particlesim.setup.placement import Trials, from_middle
 from particlesim.simulation.conserved import conserved
