@@ -13,7 +13,7 @@ from particlesim.geometry.shape_table import stack_shapes
 from particlesim.model.bodies import make_particles
 from particlesim.model.domain import make_domain
 from particlesim.model.materials import Material
-from particlesim.model.overlap import deepest_overlap, touching_half_spaces, touching_pairs
+from particlesim.model.overlap import deepest_overlap, touching_pairs, touching_surroundings
 from particlesim.setup.build import assemble
 from tests import oracles
 from tests.oracles import unit_quaternion
@@ -99,7 +99,7 @@ def test_walls_against_all_vertices():
             assert np.array_equal(normal, side * np.eye(3)[axis])
             np.testing.assert_allclose(side * points[:, axis], reach_of(system.body[i], axis, side), atol=1e-6)
     expected = [(i, system.bounded + wall) for i, wall in np.argwhere(gaps <= 0.0).tolist()]
-    assert [tuple(row) for row in touching_half_spaces(system).tolist()] == expected
+    assert [tuple(row) for row in touching_surroundings(system).tolist()] == expected
     assert len(expected) > 100
 
 
@@ -110,7 +110,7 @@ def test_only_walls_are_touched(boundary):
     gaps = walls_by_force(system)[:, solid]
     assert system.body["wall"][system.bounded :].tolist() == np.flatnonzero(solid).tolist()
     expected = [(i, system.bounded + k) for i, k in np.argwhere(gaps <= 0.0).tolist()]
-    assert [tuple(row) for row in touching_half_spaces(system).tolist()] == expected
+    assert [tuple(row) for row in touching_surroundings(system).tolist()] == expected
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,7 @@ def test_nothing_overlaps_nothing():
     system = bodies(world(10.0), [0, 1], [1.0, 1.0], [[-2.0, 0, 0], [2.0, 0, 0]], [UPRIGHT, UPRIGHT])
     assert deepest_overlap(system, all_pairs(2)) == 0.0
     assert touching_pairs(system, np.empty((0, 2), dtype=np.int64)).shape == (0, 2)
-    assert touching_half_spaces(system).shape == (0, 2)
+    assert touching_surroundings(system).shape == (0, 2)
 
 
 def test_the_number_of_threads_changes_nothing():

@@ -22,7 +22,8 @@ def set_tolerances(system: System) -> None:
 
 def periodic_room(system: System) -> float:
     """How far two bodies may both go on periodic axes [m] without coming near another image; inf without such axes."""
-    period, radius = system.domain[0]["period"], system.body["radius"][: system.bounded]
+    period, radius = system.domain[0]["period"], system.body["radius"]
+    radius = radius[np.isfinite(radius)]
     periods = period[period > 0.0]
     if not len(periods) or not len(radius):
         return math.inf

@@ -79,6 +79,11 @@ KEEP_NORMAL_MOTION = 0.25
 # Refinements of a conservative step, which is shorter than it could be where other vertices come to the fore.
 STEP_REFINEMENTS = 3
 
+# What is touched of a mesh at the time of an impact is nearer than this fraction of the particle's size [1]: two orders
+# above the tolerance of impacts, for what touches at one time touches in one place by rounding earlier than in another.
+# Larger: triangles that are met a moment later count as met now. Smaller: a box that lands flat tips over.
+MESH_TOUCH = 1e-10
+
 # ---- impacts -------------------------------------------------------------------------------------------------------
 
 # Slower than this fraction of the surface speeds involved, a contact does not approach [1]: it is rounding. Larger:

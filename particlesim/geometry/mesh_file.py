@@ -1,4 +1,4 @@
-"""The points that the faces of a mesh file have."""
+"""Mesh files: the points that their faces have, and their triangles as they are."""
 
 from __future__ import annotations
 
@@ -36,6 +36,22 @@ def mesh_vertices(path: Path, unit: str = "m") -> np.ndarray:
     ValueError
         If it is no mesh: the path, and what is wrong.
     """
+    return np.concatenate([vertices[np.unique(triangles)] for vertices, triangles in _solids(path, unit)])
+
+
+def mesh_triangles(path: Path, unit: str = "m") -> tuple[np.ndarray, np.ndarray]:
+    """All triangles of an STL, OBJ or PLY file: points (v, 3) float64 [m], and three of them for each (t, 3) int64.
+
+    Parameters and exceptions are those of ``mesh_vertices``. Points may be there more than once.
+    """
+    solids = _solids(path, unit)
+    ends = np.cumsum([len(vertices) for vertices, _ in solids])
+    triangles = [rows + end - len(vertices) for (vertices, rows), end in zip(solids, ends, strict=True)]
+    return np.concatenate([vertices for vertices, _ in solids]), np.concatenate(triangles)
+
+
+def _solids(path: Path, unit: str) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Points [m] and triangles of each part of a file that has faces."""
     if unit not in UNITS:
         raise ValueError(f"the unit of a mesh must be one of {', '.join(UNITS)}, not {unit!r}")
     if not path.is_file():
@@ -44,28 +60,28 @@ def mesh_vertices(path: Path, unit: str = "m") -> np.ndarray:
         check_mesh_file(path)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    points = _points(path, _readable(path, path.read_bytes()))
-    if not np.isfinite(points).all():
+    solids = _parts(path, _readable(path, path.read_bytes()))
+    if not all(np.isfinite(vertices[triangles]).all() for vertices, triangles in solids):
         raise ValueError(f"{path}: holds numbers that are not finite")
-    return points * UNITS[unit]
+    return [(vertices * UNITS[unit], triangles) for vertices, triangles in solids]
 
 
-def _points(path: Path, data: bytes) -> np.ndarray:
-    """The corners of all faces, in the units of the file. ValueError if it has none."""
+def _parts(path: Path, data: bytes) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Points and triangles of each part, in the units of the file. ValueError if it has none."""
     import trimesh  # noqa: PLC0415  (slow to import, needed for meshes only)
 
     ending = path.suffix.lower().removeprefix(".")
     try:
         scene: Any = trimesh.load(io.BytesIO(data), file_type=ending, force="scene", process=False)
         solids = [part for part in scene.dump() if len(getattr(part, "faces", ()))]
-        points = [part.vertices[np.unique(part.faces)] for part in solids]
+        parts = [(np.array(part.vertices, np.float64), np.array(part.faces, np.int64)) for part in solids]
     except Exception as error:
         # What is missing may be a module that guesses what a text is written in: the file is to blame all the same.
         words = "" if isinstance(error, ImportError) else f" ({' '.join(str(error).split()) or type(error).__name__})"
         raise ValueError(f"{path}: truncated, or not a mesh: it ends at byte {len(data):,}{words}") from error
-    if not points:
+    if not parts:
         raise ValueError(f"{path}: has no faces; points and lines are not a mesh")
-    return np.concatenate(points).astype(np.float64)
+    return parts
 
 
 def _readable(path: Path, data: bytes) -> bytes:

@@ -59,6 +59,11 @@ def cell_middles() -> np.ndarray:
     return np.concatenate(faces)
 
 
+def links_before_rings() -> int:
+    """How many numbers of a part come before those that say where the neighbours of each vertex begin."""
+    return 6 * CELLS * CELLS
+
+
 @kernel
 def cell_of(direction):
     """The cell that a direction of any length is in."""

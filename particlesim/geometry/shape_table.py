@@ -8,14 +8,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from particlesim.core.constants import TRIANGLE
 from particlesim.core.records import record
-from particlesim.geometry.shape_links import links_of
+from particlesim.geometry.flat_prisms import CORNERS, EDGES, FACES, LINKS, flat_prisms
+from particlesim.geometry.shape_links import links_before_rings, links_of
 from particlesim.geometry.shapes import Shape
 
 # A shape: a convex core and a rounding radius. Ranges are half open, into the other arrays of the table.
 SHAPE = record(
     [
-        ("kind", np.int64),  # SPHERE, CAPSULE, POLYHEDRON or HALF_SPACE
+        ("kind", np.int64),  # SPHERE, CAPSULE, POLYHEDRON, HALF_SPACE, MESH or TRIANGLE
         ("radius", np.float64),  # of the bounding sphere at size 1, rounding included [m]
         ("inradius", np.float64),  # of the inscribed sphere at size 1, rounding included [m]
         ("rounding", np.float64),  # how far the surface is outside of the core at size 1 [m]
@@ -26,6 +28,8 @@ SHAPE = record(
         ("first_edge", np.int64),
         ("last_edge", np.int64),
         ("link", np.int64),  # where its part of the table's ``link`` begins; -1 of a shape without edges
+        ("first_triangle", np.int64),  # of a mesh: rows of shapes, in the order of its tree
+        ("last_triangle", np.int64),
     ],
 )
 
@@ -41,7 +45,7 @@ FACE = record(
 
 
 class ShapeTable(NamedTuple):
-    """All shapes of a scene end to end."""
+    """All shapes of a scene end to end, then the triangles of those that are meshes."""
 
     shape: np.ndarray  # (s,) SHAPE
     vertex: np.ndarray  # (v, 3) float64, of the cores at size 1, body axes [m]
@@ -51,13 +55,26 @@ class ShapeTable(NamedTuple):
     link: np.ndarray  # (k,) int64: which vertices, and which faces, are neighbours (see shape_links.py)
 
 
-def stack_shapes(shapes: Sequence[Shape]) -> ShapeTable:
-    """The shapes as one table for the kernels, which is not to be written to: the same shapes have the same one."""
-    return _stacked(tuple(shapes))
+def stack_shapes(shapes: Sequence[Shape], drawn: bool = False) -> ShapeTable:
+    """The shapes as one table for the kernels, which is not to be written to: the same shapes have the same one.
+
+    Triangles are about the position of their mesh, that they turn about; to be ``drawn``, about their own middles.
+    """
+    return _stacked(tuple(shapes), drawn)
 
 
 @functools.lru_cache(maxsize=8)
-def _stacked(shapes: tuple[Shape, ...]) -> ShapeTable:
+def _stacked(shapes: tuple[Shape, ...], drawn: bool) -> ShapeTable:
+    table = _stacked_as_they_are(shapes)
+    for row, shape in enumerate(shapes):
+        if len(shape.triangles):
+            corners = shape.vertices[shape.triangles]
+            table = _with_triangles(table, row, corners - corners.mean(axis=1, keepdims=True) if drawn else corners)
+    return table
+
+
+def _stacked_as_they_are(shapes: tuple[Shape, ...]) -> ShapeTable:
+    """The table of shapes, of meshes without their triangles."""
     table = np.zeros(len(shapes), dtype=SHAPE)
     for field in ("kind", "radius", "inradius", "rounding"):
         table[field] = [getattr(shape, field) for shape in shapes]
@@ -112,3 +129,37 @@ def _links(shapes: Sequence[Shape], edges: Sequence[np.ndarray], table: np.ndarr
             parts.append(links_of(shape.vertices, shape.faces, rows, int(row["first_vertex"]), size))
             size += len(parts[-1])
     return np.concatenate(parts)
+
+
+def _with_triangles(table: ShapeTable, mesh: int, corners: np.ndarray) -> ShapeTable:
+    """The table with triangles (t, 3, 3) after its shapes, which are those of the shape in row ``mesh``."""
+    count, prisms = len(corners), flat_prisms(corners)
+    rows, each = np.zeros(count, dtype=SHAPE), np.arange(count)
+    rows["kind"], rows["radius"] = TRIANGLE, np.linalg.norm(corners, axis=2).max(axis=1)
+    for name, number, old in (("vertex", 3, table.vertex), ("face", FACES, table.face), ("edge", EDGES, table.edge)):
+        rows[f"first_{name}"] = len(old) + number * each
+        rows[f"last_{name}"] = rows[f"first_{name}"] + number
+    # Cells of directions, which come before, are looked at where a core has many vertices.
+    rows["link"] = len(table.link) + LINKS * each - links_before_rings()
+    shape = np.concatenate([table.shape, rows])
+    shape["first_triangle"][mesh], shape["last_triangle"][mesh] = len(table.shape), len(shape)
+    vertex = rows["first_vertex"][:, None]
+    face = np.zeros(FACES * count, dtype=FACE)
+    face["normal"], face["offset"] = prisms.normals.reshape(-1, 3), prisms.offsets.ravel()
+    ends = len(table.loop) + CORNERS[-1] * each[:, None]
+    face["first"], face["last"] = (ends + CORNERS[:-1]).ravel(), (ends + CORNERS[1:]).ravel()
+    numbers = np.concatenate([vertex, vertex, rows["first_face"][:, None], rows["first_face"][:, None]], axis=1)
+    return ShapeTable(
+        shape=shape,
+        vertex=np.concatenate([table.vertex, corners.reshape(-1, 3)]),
+        face=np.concatenate([table.face, face]),
+        loop=np.concatenate([table.loop, (prisms.loops + vertex).ravel()]),
+        edge=np.concatenate([table.edge, (prisms.edges + numbers[:, None, :]).reshape(-1, 4)]),
+        link=np.concatenate([table.link, _triangle_links(len(table.link), rows["first_vertex"])]),
+    )
+
+
+def _triangle_links(begin: int, first_vertex: np.ndarray) -> np.ndarray:
+    """The neighbours of the vertices of triangles (t,), as in ``links_of``; ``begin``: where they stand in ``link``."""
+    lists = begin + LINKS * np.arange(len(first_vertex))[:, None] + 4 + np.array([0, 2, 4, 6])
+    return np.concatenate([lists, first_vertex[:, None] + np.array([1, 2, 0, 2, 0, 1])], axis=1).ravel()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import pi
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from particlesim.core.constants import CAPSULE, HALF_SPACE, POLYHEDRON, SPHERE
+from particlesim.core.constants import CAPSULE, HALF_SPACE, MESH, POLYHEDRON, SPHERE
 from particlesim.core.polyhedra import POLYHEDRA
 from particlesim.geometry.convex_hull import (
     NO_VOLUME,
@@ -32,9 +32,12 @@ from particlesim.geometry.mass_properties import (
     rounded_mass_properties,
 )
 from particlesim.geometry.mesh_file import mesh_vertices
-from particlesim.geometry.tolerances import MAX_MESH_VERTICES
+from particlesim.geometry.triangle_surface import surface_of_triangles
+from particlesim.geometry.tolerances import MAX_MESH_VERTICES, MAX_TRIANGLES
+from particlesim.geometry.triangle_tree import tree_order
 
 _UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+_NO_TRIANGLES = np.zeros((0, 3), dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +50,7 @@ class Shape:
     ----------
     name : str
     kind : int
-        SPHERE, CAPSULE, POLYHEDRON, or HALF_SPACE (see ``half_space``).
+        SPHERE, CAPSULE, POLYHEDRON, HALF_SPACE (see ``half_space``) or MESH (see ``triangle_mesh``).
     vertices : (v, 3) float64 [m]
         Of the core.
     faces : tuple of tuples of int
@@ -65,6 +68,10 @@ class Shape:
     described_corners : int
         How many corners the hull of a mesh has; more than there are vertices if it was thinned. Volume, centroid and
         moments are those of the whole hull. 0 of a shape that is no hull.
+    triangles : (t, 3) int64
+        Of a mesh: its triangles, by their vertices, in the order of the tree over them; (0, 3) of any other shape.
+    remarks : tuple of str
+        Of a mesh: what is odd about it, a line each.
     """
 
     name: str
@@ -78,6 +85,8 @@ class Shape:
     inradius: float
     orientation: np.ndarray
     described_corners: int = 0
+    triangles: np.ndarray = field(default_factory=lambda: _NO_TRIANGLES)
+    remarks: tuple[str, ...] = ()
 
     @property
     def is_sphere(self) -> bool:
@@ -88,6 +97,11 @@ class Shape:
     def is_bounded(self) -> bool:
         """Whether it has a bounding sphere, as all shapes but half-spaces have."""
         return self.kind != HALF_SPACE
+
+    @property
+    def is_convex(self) -> bool:
+        """Whether it is one core with a rounding radius, as all shapes but meshes are."""
+        return self.kind != MESH
 
     @cached_property
     def face_normals(self) -> np.ndarray:
@@ -128,6 +142,25 @@ def half_space(normal: Any = (1.0, 0.0, 0.0)) -> Shape:
     plane = np.array([np.zeros(3), along, np.cross(outwards, along)])
     none = np.full(3, np.inf)
     return Shape("half_space", HALF_SPACE, plane, ((0, 1, 2),), 0.0, np.inf, none, np.inf, np.inf, _UPRIGHT)
+
+
+def triangle_mesh(name: str, points: Any, triangles: Any) -> Shape:
+    """Triangles (t, 3) between ``points`` (p, 3) [m] as they are: an obstacle that has two sides and no volume.
+
+    Its position is the origin of the points. ValueError if there are too many triangles, or none has an area.
+    """
+    corners = np.asarray(triangles, dtype=np.int64)
+    if len(corners) > MAX_TRIANGLES:
+        raise ValueError(f"'{name}' has {len(corners):,} triangles; there may be up to {MAX_TRIANGLES:,}")
+    surface = surface_of_triangles(np.asarray(points, dtype=np.float64), corners)
+    return tree_mesh(name, surface.vertices, surface.triangles, surface.remarks)
+
+
+def tree_mesh(name: str, vertices: np.ndarray, triangles: np.ndarray, remarks: tuple[str, ...] = ()) -> Shape:
+    """As ``triangle_mesh``, of triangles that are in order already."""
+    order = tree_order(vertices[triangles])
+    none, radius = np.full(3, np.inf), float(np.linalg.norm(vertices, axis=1).max())
+    return Shape(name, MESH, vertices, (), 0.0, np.inf, none, radius, np.inf, _UPRIGHT, 0, triangles[order], remarks)
 
 
 def hull(name: str, vertices: Any, rounding: float = 0.0) -> Shape:

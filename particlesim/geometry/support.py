@@ -9,7 +9,7 @@ has turned already is a tuple (row, size, rotation matrix).
 
 import math
 
-from particlesim.core.constants import HALF_SPACE, SPHERE
+from particlesim.core.constants import HALF_SPACE, MESH, SPHERE
 from particlesim.core.jit import kernel
 from particlesim.core.math3d import (
     dot,
@@ -148,6 +148,12 @@ def has_many_vertices(table, shape):
 def is_half_space(table, shape):
     """Whether a shape is all that lies behind a plane."""
     return table.shape[shape].kind == HALF_SPACE
+
+
+@kernel
+def is_mesh(table, shape):
+    """Whether a shape is triangles, each of which is a shape by itself."""
+    return table.shape[shape].kind == MESH
 
 
 @kernel

@@ -28,6 +28,13 @@ PRINCIPAL_AXES = 1e-12
 # crowds look at more faces. Smaller: round meshes lose their curvature; a ball of so many is off by 4e-4 of its radius.
 MAX_MESH_VERTICES = 4096
 
+# Height of a triangle of a mesh as a fraction of its longest side below which it has no area: its normal is rounding.
+# Larger: slits of that width open in surfaces. Smaller: normals of slivers point anywhere.
+FLATTEST_TRIANGLE = 1e-8
+
+# The most triangles of a mesh, which take 0.8 kB each. More: memory.
+MAX_TRIANGLES = 500_000
+
 # --- Support: how far a core reaches ---------------------------------------------------------------------------------
 
 # Cores of so many vertices or more are climbed along their edges, others gone through one by one: of 96 that takes
@@ -116,3 +123,18 @@ ON_EDGE = 1e-9
 # the plane as this slope [1] where they are less far out. Larger: what rolls on a fine mesh lacks the corners next to
 # the lowest; smaller: what lies flat but for rounding lies on corners of one side, and rocks.
 SPREAD_SLOPE = 1e-2
+
+# --- Triangle meshes -------------------------------------------------------------------------------------------------
+
+# Triangles of a leaf of the tree over a mesh at most. It only decides how long a search takes.
+TRIANGLES_OF_LEAF = 4
+
+# Sine of the angle by which a normal may lean over a triangle that lies beside the one it is of, and from the normal of
+# a face that it is the same as [1]. Larger: what slides catches on inner edges, as so much of its speed is towards
+# them. Smaller: rounding, in a mesh a million times as large as what touches it, hides real contacts.
+NORMAL_SINE = 1e-8
+
+# Fraction of the extent of a patch on several triangles by which a point must stand out from the others to be a corner:
+# two orders above ON_EDGE, by which points of neighbouring triangles differ. Smaller: corners are there twice, and a
+# box that lands flat starts to spin. Larger: patches lose corners.
+PATCH_CORNER = 1e-7

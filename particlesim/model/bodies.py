@@ -40,7 +40,7 @@ BODY = record(
         ("inverse_mass", "f8"),  # 0 of what is not dynamic [1/kg]
         ("scale", "f8"),  # factor on the shape of size 1
         ("mass", "f8"),  # infinite of what is not dynamic [kg]
-        ("inradius", "f8"),  # inscribed sphere [m]
+        ("inradius", "f8"),  # inscribed sphere; infinite of surroundings, whose size says nothing [m]
         ("time", "f8"),  # local clock: when the record describes the body, since the start of the substep [s]
         ("material", "i4"),  # row and column of the contact laws
         ("group", "i4"),  # entry of the scene's particles that it came from; -1 of obstacles

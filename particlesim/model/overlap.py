@@ -9,7 +9,9 @@ from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import dot, load_vec3, set_vec3, sub, to_vec3
 from particlesim.core.parallel import ThreadTeam
 from particlesim.geometry.narrow_phase.gjk import NO_SIMPLEX
+from particlesim.geometry.narrow_phase.mesh import mesh_separation
 from particlesim.geometry.narrow_phase.pair import pair_overlaps, pair_separation
+from particlesim.geometry.support import is_mesh
 from particlesim.model.bodies import placed
 from particlesim.model.domain import nearest_image
 from particlesim.model.system import System
@@ -23,14 +25,19 @@ def offset_of(system, i, j):
 
 
 @kernel
-def overlaps_any(shapes, a, point, others, period, points):
+def overlaps_any(shapes, meshes, a, point, others, period, points):
     """Whether a body ``a``, put at a ``point``, overlaps any of ``others``; ``points`` is scratch."""
     placed_a = placed(a)
     for k in range(len(others)):
         b = others[k]
         offset = nearest_image(sub(to_vec3(b.position), point), period)
         reach = a.radius + b.radius
-        if dot(offset, offset) <= reach * reach and pair_overlaps(shapes, placed_a, placed(b), offset, points):
+        if dot(offset, offset) > reach * reach:
+            continue
+        if meshes is not None and is_mesh(shapes, b.shape_row):
+            if mesh_separation(shapes, meshes, placed_a, placed(b), offset, points) <= 0.0:
+                return True
+        elif pair_overlaps(shapes, placed_a, placed(b), offset, points):
             return True
     return False
 
@@ -48,7 +55,7 @@ def put_where_free(system, others, count, bodies, proposals):
         found = False
         for attempt in range(proposals.shape[1]):
             point = load_vec3(proposals[i], attempt)
-            if not overlaps_any(system.shapes, bodies[i], point, others[:count], period, points):
+            if not overlaps_any(system.shapes, system.meshes, bodies[i], point, others[:count], period, points):
                 set_vec3(bodies[i].position, point)
                 found = True
                 break
@@ -59,14 +66,22 @@ def put_where_free(system, others, count, bodies, proposals):
     return len(bodies)
 
 
+@kernel
+def _separation(shapes, meshes, a, b, offset, points):
+    """Separation of a convex shape from another, or from a mesh, both placed [m] (see ``mesh_separation``)."""
+    if meshes is not None and is_mesh(shapes, b[0]):
+        return mesh_separation(shapes, meshes, a, b, offset, points)
+    separation, _, _ = pair_separation(shapes, a, b, offset, NO_SIMPLEX, points)
+    return separation
+
+
 @entry_kernel
 def separation_of(system, i, j):
-    """Separation of bodies i < j where they are now [m]."""
+    """Separation of bodies i < j where they are now [m]; from a mesh any above 0 if they are apart."""
     system = without_refcounts(system)
     points = np.empty((MAX_MANIFOLD, 3))
     a, b = placed(system.body[i]), placed(system.body[j])
-    separation, _, _ = pair_separation(system.shapes, a, b, offset_of(system, i, j), NO_SIMPLEX, points)
-    return separation
+    return _separation(system.shapes, system.meshes, a, b, offset_of(system, i, j), points)
 
 
 @entry_kernel
@@ -91,8 +106,8 @@ def touching_pairs(system: System, pairs: np.ndarray) -> np.ndarray:
 
 
 @entry_kernel
-def touching_half_spaces(system):
-    """Particles that touch or cross a half-space, (m, 2): the particle and the half-space."""
+def touching_surroundings(system):
+    """Particles that touch or cross a half-space or a mesh, (m, 2): the particle and that body."""
     system = without_refcounts(system)
     found = np.empty((64, 2), dtype=np.int64)
     count = 0
@@ -117,6 +132,6 @@ def _deepest_of(system, pairs):
 
 
 def deepest_overlap(system: System, pairs: np.ndarray) -> float:
-    """The largest overlap among candidate pairs and with half-spaces [m]; 0 if nothing overlaps."""
-    touching = touching_pairs(system, pairs), touching_half_spaces(system)
+    """The largest overlap among candidate pairs and with surroundings [m]; 0 if nothing overlaps."""
+    touching = touching_pairs(system, pairs), touching_surroundings(system)
     return float(max(_deepest_of(system, contacts) for contacts in touching))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from particlesim.core.records import cache_aligned
+from particlesim.geometry.mesh_table import MeshTable
 from particlesim.geometry.shape_table import ShapeTable
 from particlesim.geometry.shapes import Shape
 from particlesim.model.bodies import BODY
@@ -16,8 +17,9 @@ from particlesim.model.fields import FIELD
 class System(NamedTuple):
     """Bodies and what they are made of, as the kernels take them.
 
-    Rows ``0 .. particles`` of ``body`` are dynamic, ``particles .. bounded`` obstacles of bounded extent, and
-    ``bounded ..`` half-spaces, which the broad phase knows nothing of.
+    Rows ``0 .. particles`` of ``body`` are dynamic, ``particles .. bounded`` convex obstacles of bounded extent, and
+    ``bounded ..`` surroundings, half-spaces and meshes, which the broad phase knows nothing of: each particle is looked
+    at with each of them. Code for meshes is compiled only where there are any.
     """
 
     shapes: ShapeTable
@@ -27,6 +29,7 @@ class System(NamedTuple):
     domain: np.ndarray  # (1,) DOMAIN
     particles: int
     bounded: int
+    meshes: MeshTable | None = None
 
 
 class Model(NamedTuple):
@@ -59,9 +62,9 @@ class Model(NamedTuple):
 
 
 def make_system(
-    shapes: ShapeTable, particles: np.ndarray, obstacles: np.ndarray, half_spaces: np.ndarray, **rest: np.ndarray
+    shapes: ShapeTable, particles: np.ndarray, obstacles: np.ndarray, surroundings: np.ndarray, **rest: Any
 ) -> System:
-    """The system of these bodies, in the order that its rows have; ``rest`` are law, motion and domain."""
-    body = cache_aligned(np.concatenate([particles, obstacles, half_spaces]))
+    """The system of these bodies, in the order that its rows have; ``rest`` are law, motion, domain and meshes."""
+    body = cache_aligned(np.concatenate([particles, obstacles, surroundings]))
     bounded = len(particles) + len(obstacles)
     return System(shapes, body, particles=len(particles), bounded=bounded, **rest)

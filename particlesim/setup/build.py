@@ -9,12 +9,13 @@ import numpy as np
 
 from particlesim.broad_phase import find_pairs
 from particlesim.core.constants import OPEN, PERIODIC, WALL, WALL_NAMES
+from particlesim.geometry.mesh_table import stack_meshes
 from particlesim.geometry.shape_table import stack_shapes
 from particlesim.geometry.shapes import Shape, half_space
 from particlesim.model.bodies import make_particles
 from particlesim.model.domain import make_domain, make_walls, wall_normals
 from particlesim.model.materials import Material, PairLaw, contact_laws
-from particlesim.model.overlap import separation_of, touching_half_spaces, touching_pairs
+from particlesim.model.overlap import separation_of, touching_pairs, touching_surroundings
 from particlesim.model.prescribed_motion import place_kinematic
 from particlesim.model.system import Model, System, make_system
 from particlesim.scene import Scene
@@ -71,7 +72,7 @@ def build(scene: Scene, obstacles: Sequence[Obstacle] = ()) -> Model:
     )
     particles = model.particles
     place_kinematic(model.system.body, model.system.motion, 0.0)
-    table = model.system.shapes, obstacles_among(model.system)
+    table = model.system.shapes, model.system.meshes, obstacles_among(model.system)
     particles["position"] = positions(
         scene, table, space_of(domain), crowd, np.ascontiguousarray(particles["orientation"]), randoms
     )
@@ -93,18 +94,19 @@ def assemble(
     The first of the ``materials`` is that of the walls, the others those of the particles.
     """
     walls = [half_space(tuple(normal)) for normal in wall_normals().tolist()]
-    table = stack_shapes([*shapes, *walls, *(obstacle.shape for obstacle in obstacles)])
+    all_shapes = [*shapes, *walls, *(obstacle.shape for obstacle in obstacles)]
     others = obstruct(obstacles, len(shapes) + len(walls), len(materials))
     materials = [*materials, *(obstacle.material for obstacle in obstacles)]
-    half_spaces = np.concatenate([make_walls(domain, len(shapes)), others.half_spaces])
+    surroundings = np.concatenate([make_walls(domain, len(shapes)), others.surroundings])
     system = make_system(
-        table,
+        stack_shapes(all_shapes),
         particles,
         others.bounded,
-        half_spaces,
+        surroundings,
         law=contact_laws(materials, pair_laws),
         motion=others.motion,
         domain=domain,
+        meshes=stack_meshes(all_shapes),
     )
     return Model(tuple(shapes), np.array([material.restitution for material in materials]), system)
 
@@ -244,7 +246,7 @@ def _check_apart(scene: Scene, system: System) -> None:
     reach = bounded["radius"][:, None]
     pairs = find_pairs(bounded["position"] - reach, bounded["position"] + reach, period=system.domain[0]["period"])
     pairs = pairs[pairs[:, 0] < system.particles]
-    for contacts in (touching_half_spaces(system), touching_pairs(system, pairs)):
+    for contacts in (touching_surroundings(system), touching_pairs(system, pairs)):
         for i, j in contacts.tolist():
             separation = separation_of(system, i, j)
             if separation < -_TOLERATED_OVERLAP * system.body["radius"][i]:

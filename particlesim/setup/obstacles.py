@@ -53,8 +53,8 @@ class Obstacle(NamedTuple):
 class Obstructed(NamedTuple):
     """Obstacles as the system takes them."""
 
-    bounded: np.ndarray  # (b,) BODY
-    half_spaces: np.ndarray  # (h,) BODY
+    bounded: np.ndarray  # (b,) BODY, convex ones of bounded extent
+    surroundings: np.ndarray  # (h,) BODY, half-spaces and meshes
     motion: np.ndarray  # (k,) MOTION
 
 
@@ -70,14 +70,14 @@ def obstruct(obstacles: Sequence[Obstacle], first_shape: int, first_material: in
         if o.moves:
             b["kind"], b["motion"] = KINEMATIC, sum(map(len, motions))
             motions.append(_motion_of(o))
-    bounded = np.array([o.shape.is_bounded for o in obstacles], dtype=bool)
+    bounded = np.array([o.shape.is_bounded and o.shape.is_convex for o in obstacles], dtype=bool)
     return Obstructed(bodies[bounded], bodies[~bounded], np.concatenate(motions))
 
 
 def poses_at(obstacles: Sequence[Obstacle], time: float) -> np.ndarray:
     """The obstacles as they are at ``time`` [s], (n,) BODY, in their order."""
     found = obstruct(obstacles, 0, 0)
-    bodies = np.concatenate([found.bounded, found.half_spaces])
+    bodies = np.concatenate([found.bounded, found.surroundings])
     place_kinematic(bodies, found.motion, time)
     return bodies[np.argsort(bodies["entry"])]
 

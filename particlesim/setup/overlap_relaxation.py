@@ -16,6 +16,7 @@ from particlesim.broad_phase import find_pairs
 from particlesim.core.constants import MAX_MANIFOLD
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import axpy, dot, scale, set_vec3, sub, to_vec3
+from particlesim.geometry.mesh_table import MeshTable
 from particlesim.geometry.narrow_phase.gjk import NO_SIMPLEX
 from particlesim.geometry.narrow_phase.pair import pair_separation
 from particlesim.geometry.shape_table import ShapeTable
@@ -23,8 +24,8 @@ from particlesim.model.bodies import placed
 from particlesim.model.domain import nearest_image
 from particlesim.setup.random_insertion import Insertion
 
-# The shapes that there are, and the obstacles, (k,) BODY.
-Known = tuple[ShapeTable, np.ndarray]
+# The shapes that there are, the meshes among them, and the obstacles, (k,) BODY.
+Known = tuple[ShapeTable, MeshTable | None, np.ndarray]
 
 # Two that overlap are pushed to a gap of this fraction of their inscribed radii. Without one they come apart in ever
 # smaller steps; a wider one takes room, three times as much of the fill.
@@ -106,7 +107,7 @@ def _pass(known, insertion, mobility, pairs):
 
     Returns the sum of the overlaps that were found, as fractions of the inscribed radii.
     """
-    (table, obstacles), insertion = without_refcounts(known), without_refcounts(insertion)
+    (table, _, obstacles), insertion = without_refcounts(known), without_refcounts(insertion)
     mobility, pairs = without_refcounts(mobility), without_refcounts(pairs)
     body, period, points = insertion.body, to_vec3(insertion.space[0].period), np.empty((MAX_MANIFOLD, 3))
     overlap = 0.0

@@ -206,11 +206,11 @@ def _overlaps_any(table, insertion, i, point, points):
 def try_in_place(known, insertion, indices, proposals):
     """Put each particle of ``indices`` (m,), all of one level, at the first of its ``proposals`` where it is free.
 
-    ``known`` are the table of shapes, and the obstacles (k,) BODY.
+    ``known`` are the tables of shapes and of meshes, and the obstacles (k,) BODY.
     ``proposals`` (m, tries, 3) [m].  Returns whether there was one, (m,).  All that are finer and in place must have
     been filed under this level (see ``refile``).
     """
-    (table, obstacles), insertion = without_refcounts(known), without_refcounts(insertion)
+    (table, meshes, obstacles), insertion = without_refcounts(known), without_refcounts(insertion)
     points, period = np.empty((MAX_MANIFOLD, 3)), to_vec3(insertion.space[0].period)
     fits = np.zeros(len(indices), dtype=np.bool_)
     for k in range(len(indices)):
@@ -219,7 +219,7 @@ def try_in_place(known, insertion, indices, proposals):
             point = to_vec3(proposals[k, attempt])
             if not (
                 _overlaps_any(table, insertion, i, point, points)
-                or overlaps_any(table, insertion.body[i], point, obstacles, period, points)
+                or overlaps_any(table, meshes, insertion.body[i], point, obstacles, period, points)
             ):
                 for axis in range(3):
                     insertion.body[i].position[axis] = point[axis]

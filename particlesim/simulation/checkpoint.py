@@ -14,6 +14,7 @@ import numpy as np
 from particlesim.core.atomic_write import atomic_write
 from particlesim.core.records import as_records, cache_aligned
 from particlesim.dynamics.solver_state import Counts, SolverState
+from particlesim.geometry.mesh_table import MeshTable
 from particlesim.geometry.shape_table import ShapeTable
 from particlesim.geometry.shapes import Shape
 from particlesim.model.system import Model, System
@@ -21,7 +22,7 @@ from particlesim.scene import Scene
 from particlesim.scene.file import SceneError, stored_scene
 from particlesim.simulation.flow import FlowState
 
-_FORMAT = 3
+_FORMAT = 4
 
 
 class CheckpointError(ValueError):
@@ -54,6 +55,9 @@ def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
         "done": done,
     }
     arrays = {f"shapes.{name}": array for name, array in system.pop("shapes")._asdict().items()}
+    meshes = system.pop("meshes")
+    if meshes is not None:
+        arrays |= {f"meshes.{name}": array for name, array in meshes._asdict().items()}
     arrays |= {f"system.{name}": array for name, array in system.items()}
     arrays |= {f"state.{name}": array for name, array in state.arrays().items()}
     arrays |= {f"counts.{name}": np.asarray(value) for name, value in asdict(counts).items()}
@@ -87,8 +91,15 @@ def _assembled(text: dict[str, Any], arrays: dict[str, np.ndarray]) -> Checkpoin
     """The checkpoint of what was stored."""
     arrays = {name: as_records(array) for name, array in arrays.items()}
     table = ShapeTable(**_under("shapes.", arrays))
+    meshes = _under("meshes.", arrays)
     arrays["system.body"] = cache_aligned(arrays["system.body"])
-    system = System(table, particles=text["particles"], bounded=text["bounded"], **_under("system.", arrays))
+    system = System(
+        table,
+        particles=text["particles"],
+        bounded=text["bounded"],
+        meshes=MeshTable(**meshes) if meshes else None,
+        **_under("system.", arrays),
+    )
     shapes, drawn = (tuple(_shape(each) for each in text[key]) for key in ("shapes", "obstacle_shapes"))
     model = Model(shapes, arrays["restitution"], system, drawn, arrays["fields"], arrays["population"])
     counted = _under("counts.", arrays)
@@ -118,4 +129,6 @@ def _shape(described: dict[str, Any]) -> Shape:
     arrays = {name: np.array(described[name], dtype=np.float64) for name in ("moments", "orientation")}
     vertices = np.array(described["vertices"], dtype=np.float64).reshape(-1, 3)
     faces = tuple(tuple(loop) for loop in described["faces"])
-    return Shape(**{**described, **arrays, "vertices": vertices, "faces": faces})
+    triangles = np.array(described["triangles"], dtype=np.int64).reshape(-1, 3)
+    listed = {"faces": faces, "remarks": tuple(described["remarks"])}
+    return Shape(**{**described, **arrays, **listed, "vertices": vertices, "triangles": triangles})

@@ -3,75 +3,22 @@
 import math
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import add, cross, dot, load_vec3, norm, scale, sub, to_vec3
+from particlesim.core.math3d import dot, norm, scale, sub, to_vec3
+from particlesim.dynamics.ccd.mesh_impact import mesh_impact
 from particlesim.dynamics.ccd.time_of_impact import (
     first_touch,
-    largest_displacement,
     relative_acceleration,
     sphere_half_space_impact,
     sphere_sphere_impact,
     spheres_near,
 )
+from particlesim.dynamics.ccd.touch import may_come_near, point_velocity, speed_at_depth, touch_of
 from particlesim.dynamics.settings import APPROACH_TOLERANCE, IMPACT_TOLERANCE
 from particlesim.geometry.narrow_phase.gjk import NO_SIMPLEX
-from particlesim.geometry.narrow_phase.pair import pair_contact, pair_nearer
-from particlesim.geometry.support import half_space_plane, is_half_space, is_sphere
-from particlesim.model.bodies import STATIC, angular_velocity_of, placed
+from particlesim.geometry.support import half_space_plane, is_half_space, is_mesh, is_sphere
+from particlesim.model.bodies import STATIC, placed
 from particlesim.model.domain import nearest_image
 from particlesim.model.free_motion import advance_path
-
-
-@kernel
-def point_velocity(b, path, lever_arm):
-    """Velocity of the point of a body at ``lever_arm`` from its position, on a path."""
-    return add(path[2], cross(angular_velocity_of(path[1], path[3], to_vec3(b.principal_inertia)), lever_arm))
-
-
-@kernel
-def _speed_at_depth(depth, acceleration):
-    """Half the speed that an acceleration gives to bodies until they have sunk into each other by ``depth`` [m/s].
-
-    What parts more slowly would meet again within a moment, over and over.
-    """
-    return 0.5 * math.sqrt(2.0 * acceleration * depth)
-
-
-@kernel
-def _touches(system, a, b, paths, points):
-    """Whether two bodies touch; whether any point of their contact approaches; how deep they may go if none does [m].
-
-    If they part everywhere, that is as deep as they are. If not, or if they part so slowly that they would be back at
-    once, it is the penetration slop of their sizes, or a little deeper than they are up to twice that.
-    """
-    domain = system.domain[0]
-    path_a, path_b = paths
-    offset = nearest_image(sub(path_b[0], path_a[0]), domain.period)
-    separation, normal, count = pair_contact(
-        system.shapes, (a.shape_row, a.scale, path_a[1]), (b.shape_row, b.scale, path_b[1]), offset, points
-    )
-    sizes = a.scale if is_half_space(system.shapes, b.shape_row) else a.scale + b.scale
-    tolerance = IMPACT_TOLERANCE * sizes
-    touching = separation <= tolerance
-    slop = domain.penetration_slop * sizes
-    at_once = _speed_at_depth(slop, relative_acceleration(paths))
-    approaching, leaving = False, True
-    for k in range(count if touching else 0):
-        of_a = point_velocity(a, path_a, load_vec3(points, k))
-        of_b = point_velocity(b, path_b, sub(load_vec3(points, k), offset))
-        normal_velocity = -dot(of_a, normal) + dot(of_b, normal)
-        none = APPROACH_TOLERANCE * (norm(of_a) + norm(of_b)) + domain.rest_speed
-        approaching = approaching or normal_velocity < -none
-        leaving = leaving and normal_velocity > none + at_once
-    depth = max(0.0, -separation) + 4.0 * tolerance
-    if not leaving:
-        depth = max(slop, depth, min(depth + 0.25 * slop, 2.0 * slop))
-    return touching, approaching, depth
-
-
-@kernel
-def _neither_round_nor_flat(shapes, shape_a, shape_b):
-    """Whether the distance of two shapes has no closed form."""
-    return not (is_sphere(shapes, shape_a) or is_sphere(shapes, shape_b) or is_half_space(shapes, shape_b))
 
 
 @kernel
@@ -79,20 +26,15 @@ def _advanced_impact(system, a, b, paths, interval, simplex, points):
     """When two bodies of which one at least is more than a sphere collide in an interval, on paths given at time 0."""
     start, end = interval
     path_a, path_b = paths
-    if simplex[0] == 0 and _neither_round_nor_flat(system.shapes, a.shape_row, b.shape_row):
-        # Most are too far apart, which the first direction or two of the distance algorithm tell.
-        offset = nearest_image(sub(path_b[0], path_a[0]), system.domain[0].period)
-        distance = largest_displacement(system, a, b, paths, end)
-        placed_a, placed_b = (a.shape_row, a.scale, path_a[1]), (b.shape_row, b.scale, path_b[1])
-        if not pair_nearer(system.shapes, placed_a, placed_b, offset, distance):
-            return math.inf
+    if simplex[0] == 0 and not may_come_near(system, a, b, paths, end):
+        return math.inf
     time = first_touch(system, a, b, paths, interval, 0.0, simplex, points)
     if time == start:
         then = (
             advance_path(path_a, to_vec3(a.principal_inertia), start),
             advance_path(path_b, to_vec3(b.principal_inertia), start),
         )
-        touching, approaching, depth = _touches(system, a, b, then, points)
+        touching, approaching, depth, _ = touch_of(system, a, b, then, points)
         if touching and not approaching:
             time = first_touch(system, a, b, paths, interval, depth, simplex, points)
     return time
@@ -125,7 +67,7 @@ def _sphere_half_space(system, a, path, normal, room, motion, duration):
         surface = point_velocity(a, path, scale(normal, a.radius))
         none = APPROACH_TOLERANCE * norm(surface) + system.domain[0].rest_speed
         slop = system.domain[0].penetration_slop * a.scale
-        if -none - _speed_at_depth(slop, max(acceleration, 0.0)) <= speed <= none:
+        if -none - speed_at_depth(slop, max(acceleration, 0.0)) <= speed <= none:
             room = max(0.25 * slop, slop + room)
     return sphere_half_space_impact(room, speed, acceleration, duration)
 
@@ -156,6 +98,8 @@ def next_impact(system, a, b, paths, duration, simplex, points):
     """
     if is_half_space(system.shapes, b.shape_row):
         return _half_space_impact(system, a, b, paths, duration, points)
+    if is_mesh(system.shapes, b.shape_row):
+        return mesh_impact(system, system.meshes, a, b, paths, duration, points)
     path_a, path_b = paths
     offset = nearest_image(sub(path_b[0], path_a[0]), system.domain[0].period)
     acceleration = relative_acceleration(paths)

@@ -17,7 +17,7 @@ from particlesim.core.math3d import dot, norm, scale, sub, to_vec3
 from particlesim.core.records import record
 from particlesim.dynamics.ccd.time_of_impact import sphere_half_space_impact, sphere_sphere_impact
 from particlesim.dynamics.standing import SETTLES
-from particlesim.geometry.support import half_space_plane, is_sphere
+from particlesim.geometry.support import half_space_plane, is_mesh, is_sphere
 from particlesim.model.bodies import KINEMATIC, STATIC, angular_velocity, placed
 from particlesim.model.domain import nearest_image
 from particlesim.model.free_motion import free_acceleration
@@ -181,8 +181,8 @@ def _half_space_time(system, a, b, duration):
 
 
 @entry_kernel
-def cull_half_spaces(system, standing, duration, first, last):
-    """As ``cull_pairs``, of particles ``first .. last`` with half-spaces, which stand in no list: slot -1."""
+def cull_surroundings(system, standing, duration, first, last):
+    """As ``cull_pairs``, of particles ``first .. last`` with half-spaces and meshes, which are in no list: slot -1."""
     system, standing = without_refcounts((system, standing))
     found = np.empty((len(system.body) - system.bounded) * (last - first), dtype=CANDIDATE)
     count = 0
@@ -190,7 +190,9 @@ def cull_half_spaces(system, standing, duration, first, last):
         if _settles(standing, i):
             continue
         for j in range(system.bounded, len(system.body)):
-            time = _half_space_time(system, system.body[i], system.body[j], duration)
+            time = LOOK_CLOSER
+            if not is_mesh(system.shapes, system.body[j].shape_row):
+                time = _half_space_time(system, system.body[i], system.body[j], duration)
             if time < math.inf:
                 c = found[count]
                 c.i, c.j, c.slot, c.time = i, j, -1, time

@@ -233,7 +233,7 @@ def first_touch(system, a, b, paths, interval, depth, simplex, points):
     path_a, path_b = paths
     time, end = interval
     half_space = is_half_space(system.shapes, b.shape_row)
-    sizes = a.scale if half_space else a.scale + b.scale
+    sizes = a.scale if b.inradius == math.inf else a.scale + b.scale
     tolerance = IMPACT_TOLERANCE * sizes
     core_a, core_b = sized_core(system, a), sized_core(system, b)
     acceleration = relative_acceleration(paths)

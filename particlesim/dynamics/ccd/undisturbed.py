@@ -76,7 +76,7 @@ def longest_stretch(system: System, substep: float, wanted: float) -> float:
     It is not known, and 0, of many bodies, where there are obstacles other than walls, or where anything rests.
     """
     enough, many = MIN_STRETCH * substep, system.particles**2 > MAX_PAIRS_AT_ONCE
-    if wanted <= enough or many or system.bounded > system.particles:
+    if wanted <= enough or many or system.bounded > system.particles or system.meshes is not None:
         return 0.0
     return min(_SURELY * _time_of_all(system, enough), MAX_STRETCH * substep, wanted)
 

@@ -28,14 +28,20 @@ CONTACT = record(
 
 
 @kernel
-def find_contact(system, a, b, contact, points):
-    """Fill in the contact of two bodies where they are now, and its points; returns their separation."""
-    offset = nearest_image(sub(to_vec3(b.position), to_vec3(a.position)), system.domain[0].period)
-    separation, normal, count = pair_contact(system.shapes, placed(a), placed(b), offset, points)
+def write_contact(contact, normal, offset, count):
+    """Write what is known of a contact that has so many points."""
     set_vec3(contact.normal, normal)
     set_vec3(contact.tangent, tangent_of(normal))
     set_vec3(contact.offset, offset)
     contact.count = count
+
+
+@kernel
+def find_contact(system, a, b, contact, points):
+    """Fill in the contact of two convex bodies where they are now, and its points; returns their separation."""
+    offset = nearest_image(sub(to_vec3(b.position), to_vec3(a.position)), system.domain[0].period)
+    separation, normal, count = pair_contact(system.shapes, placed(a), placed(b), offset, points)
+    write_contact(contact, normal, offset, count)
     return separation
 
 

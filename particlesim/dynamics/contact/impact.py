@@ -19,12 +19,12 @@ from particlesim.core.math3d import add, axpy, cross, dot, load_vec3, norm, scal
 from particlesim.dynamics.contact.booking import IMPACTS, book_contact
 from particlesim.dynamics.contact.contact import (
     CONTACT,
-    find_contact,
     inverse_mass_at,
     normal_velocity_at,
     work_of_obstacle,
 )
 from particlesim.dynamics.contact.law import has_friction, rest_threshold, restitution_of, surface_velocity
+from particlesim.dynamics.contact.mesh_contact import find_contacts
 from particlesim.dynamics.contact.rough_impact import rough_impulse
 from particlesim.dynamics.settings import APPROACH_TOLERANCE, MAX_MANIFOLD_IMPULSES
 from particlesim.model.bodies import BODY, DYNAMIC, KINEMATIC, angular_velocity, angular_velocity_change, per_mass
@@ -160,6 +160,8 @@ def _propose(system, moment, c, leave_slow, friction):
     a, b = moment.actor[contact.a], moment.actor[contact.b]
     normal, offset = to_vec3(contact.normal), to_vec3(contact.offset)
     contact.impulse = contact.work = 0.0
+    if contact.count == 0:
+        return NOTHING, 0.0
     point, speed = _point_to_resolve(system.domain[0].rest_speed, a, b, contact, moment.points[c])
     if speed >= 0.0:
         return NOTHING, 0.0
@@ -233,9 +235,9 @@ def resolve_contacts(system, moment, count, size, leave_slow, accumulator):
     """
     for k in range(size):
         moment.struck[k] = 0
+    count = find_contacts(system, system.meshes, moment, count)
     for c in range(count):
         contact = moment.contact[c]
-        find_contact(system, moment.actor[contact.a], moment.actor[contact.b], contact, moment.points[c])
         contact.resolved = 0
         set_vec3(contact.shear, (0.0, 0.0, 0.0))
         set_vec3(contact.lost, (0.0, 0.0, 0.0))

@@ -48,7 +48,7 @@ from particlesim.dynamics.settings import (
 )
 from particlesim.dynamics.solver_state import SolverState
 from particlesim.geometry.narrow_phase.pair import pair_manifold
-from particlesim.geometry.support import is_half_space, is_sphere
+from particlesim.geometry.support import is_half_space, is_mesh, is_sphere
 from particlesim.model.bodies import angular_velocity_change, per_mass, placed
 from particlesim.model.domain import nearest_image
 
@@ -323,6 +323,8 @@ def contacts_of(system, neighbours, motion, search, indices, first, last):
         i = indices[k]
         place, now = neighbours.place[i], search.round[i]
         for j in range(system.bounded, len(system.body)):
+            if is_mesh(system.shapes, system.body[j].shape_row):
+                continue
             if size + MAX_MANIFOLD > len(points):
                 points, terms = grow_records(points), grow_records(terms)
             size, _, loose = add_contact(system, motion, (i, j), -np.inf, room, (points, terms), size)
@@ -371,7 +373,7 @@ def resting_on_obstacles(system, neighbours, motion, pulled, rests, first, last)
         pull = load_vec3(pulls, i)
         lead = scale(sub(pull, gravity), ahead)
         for j in range(system.bounded, len(system.body)):
-            if not rests[i]:
+            if not rests[i] and not is_mesh(system.shapes, system.body[j].shape_row):
                 size, _, _ = add_contact(system, motion, (i, j), -np.inf, room, (points, terms), 0)
                 rests[i] = _rests(terms, points, size, pull, lead)
         place = neighbours.place[i]

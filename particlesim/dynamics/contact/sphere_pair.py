@@ -33,6 +33,7 @@ def strike_alone(system, predicted, i, j):
     only_impact = k >= 0 and pairs[k, 1] == j and (k + 1 == len(pairs) or pairs[k + 1, 0] != i) and first[j] < 0
     gravity, shapes = to_vec3(system.domain[0].gravity), system.shapes
     free = dot(gravity, gravity) == 0.0 and system.bounded == system.particles and len(system.motion) == 0
+    free = free and system.meshes is None
     spheres = is_sphere(shapes, system.body[i].shape_row) and is_sphere(shapes, system.body[j].shape_row)
     return only_impact and free and spheres and not has_friction(system, system.body[i], system.body[j])
 

@@ -16,8 +16,8 @@ from particlesim.dynamics.ccd.swept_bounds import (
     CANDIDATE,
     LOOK_CLOSER,
     bounds_apart,
-    cull_half_spaces,
     cull_pairs,
+    cull_surroundings,
     free_displacement,
     inverse_period,
     write_bounds,
@@ -259,7 +259,7 @@ def predict(
     )
     if len(system.body) > system.bounded:
         parts += team.each(
-            lambda _, first, last: cull_half_spaces(system, standing, duration, first, last), system.particles
+            lambda _, first, last: cull_surroundings(system, standing, duration, first, last), system.particles
         )
     found = _colliding(system, paths, neighbours.normal, parts, duration)
     found = found[np.argsort(found["i"] * len(system.body) + found["j"])]

@@ -185,9 +185,10 @@ def wake(system, b, left, accumulator):
     if b.resting != 0:
         for k in range(system.bounded, len(system.body)):
             wall = system.body[k]
-            load = -dot(half_space_plane(system.shapes, placed(wall))[0], gravity)
-            if wall.wall >= 0 and load > 0.0:
-                accumulator[WALLS + wall.wall] -= b.mass * load * left
+            if wall.wall >= 0:
+                load = -dot(half_space_plane(system.shapes, placed(wall))[0], gravity)
+                if load > 0.0:
+                    accumulator[WALLS + wall.wall] -= b.mass * load * left
     b.resting = 0
 
 

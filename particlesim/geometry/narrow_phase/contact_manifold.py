@@ -65,7 +65,8 @@ def support_feature(table, body, offset, direction, tilt, feature):
     shape = body[0]
     local = mat_transposed_vec(body[2], direction)
     face, slope = _facing_face(table, shape, local, tilt)
-    if face >= 0:
+    # The sides of a flat prism have no area: they are edges.
+    if face >= 0 and table.face[face].last - table.face[face].first > 2:
         first, corners = table.face[face].first, table.face[face].last - table.face[face].first
         count = min(corners, MAX_FACE_CORNERS)
         for k in range(count):
