@@ -23,7 +23,7 @@ from particlesim.rendering.shading.lighting import Lighting, key_light
 from particlesim.rendering.shading.shade import Paint, Seen, seen_instances, shade
 from particlesim.rendering.shading.shadow import shadow_map
 from particlesim.rendering.visibility.instances import Instances, instances_of
-from particlesim.rendering.visibility.occlusion_clusters import occlusion_clusters
+from particlesim.rendering.visibility.occlusion_clusters import OcclusionClusters, occlusion_clusters
 from particlesim.rendering.visibility.projection import Projection
 from particlesim.rendering.visibility.rasterise import VisibilityBuffer, rasterise
 from particlesim.trajectory.frames import Frame
@@ -31,6 +31,10 @@ from particlesim.trajectory.frames import Frame
 # Widths of lines [pixels] in a picture 720 pixels high: the edges of the world, and those of the octree's cells.
 _BOX_LINE = 1.3
 _CELL_LINE = 0.8
+
+# Triangles cast shadows from so many texels of the shadow map behind them: what is lit at a slant is looked for in
+# some texels about it, and must not be in the shadow of itself.
+_TRIANGLES_BEHIND = 4.0
 
 
 class Renderer:
@@ -93,7 +97,7 @@ class Renderer:
         clusters = occlusion_clusters(instances.position, instances.tables.radius)
         projection = self._projection(view)
         buffer = rasterise(projection, instances, clusters)
-        shadow = shadow_map(rasterise(self._light.projection, instances, clusters).inverse_depth)
+        shadow = shadow_map(self._seen_by_light(instances, clusters))
         paint = self._paint(view, frame, (particles, instances), seen_instances(buffer, len(instances.position)))
         self._put_lines(view, frame)
         lighting = self._light.in_view(projection, shadow)
@@ -111,6 +115,14 @@ class Renderer:
         self._overlay.draw(image, frame, history or History())
         return image
 
+    def _seen_by_light(self, instances: Instances, clusters: OcclusionClusters) -> np.ndarray:
+        """How close to the light what its map shows is, (h, w) float32 [m]."""
+        light = self._light
+        casting = self._scenery.casting(instances, _TRIANGLES_BEHIND / light.projection.scale * light.axes[2])
+        if casting is not instances:
+            clusters = occlusion_clusters(casting.position, casting.tables.radius)
+        return rasterise(light.projection, casting, clusters).inverse_depth
+
     def _projection(self, view: View) -> Projection:
         slope = float(np.tan(0.5 * view.field_of_view))
         axes = view.pose[:3, :3].T * np.array([[1.0], [1.0], [-1.0]])
@@ -123,13 +135,13 @@ class Renderer:
         scenery, projection = self._scenery, self._projection(view)
         panes = scenery.instances(scenery.clear, time)
         seen = rasterise(projection, panes, occlusion_clusters(panes.position, panes.tables.radius))
-        which = seen_instances(seen, len(scenery.clear))
+        which = seen_instances(seen, len(panes.position))
         light = np.ones((len(which.indices), 1))
         colour = np.hstack([scenery.colours(panes.bodies(which.indices)), light])
         paint = Paint(which, colour, self._environment.haze(view))
         nothing = self._environment.ground(np.zeros((0, 0), dtype=np.float32))
         lit = shade(projection, seen, panes, paint, lighting, nothing)
-        return scenery.seen_through(colours, buffer.inverse_depth, seen, lit)
+        return scenery.seen_through(colours, buffer.inverse_depth, panes, seen, lit)
 
     def _paint(self, view: View, frame: Frame, shown: tuple[Instances, Instances], seen: Seen) -> Paint:
         """What those that are seen of the particles, and of these and obstacles, are coloured with."""

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from particlesim.core.constants import TRIANGLE
+from particlesim.core.rotations import rotations_of
 from particlesim.geometry.shape_table import stack_shapes
+from particlesim.geometry.shapes import Shape
 from particlesim.rendering.shading.colour import parse
 from particlesim.rendering.visibility.geometry_tables import BODY, GeometryTables, geometry_tables, joined
 from particlesim.rendering.visibility.instances import Instances
@@ -13,6 +18,14 @@ from particlesim.scene import Scene
 from particlesim.setup.obstacles import poses_at
 from particlesim.setup.scene_obstacles import obstacles_of
 from particlesim.trajectory.frames import Header
+
+
+class _Parts(NamedTuple):
+    """What an obstacle is drawn as."""
+
+    middle: np.ndarray  # (m, 3) of each part from the obstacle's position, in its axes [m]
+    body: np.ndarray  # (m,) BODY
+    radius: np.ndarray  # (m,) of the sphere about its middle [m]
 
 
 class Scenery:
@@ -28,23 +41,39 @@ class Scenery:
 
     def __init__(self, scene: Scene, header: Header) -> None:
         particles = geometry_tables(header)
-        self.tables = particles._replace(shapes=stack_shapes((*header.shapes, *header.obstacles)))
+        self.tables = particles._replace(shapes=stack_shapes((*header.shapes, *header.obstacles), drawn=True))
         self._obstacles = obstacles_of(scene, header.obstacles)
-        self._body = np.zeros(len(header.obstacles), dtype=BODY)
-        self._body["shape"] = len(header.shapes) + np.arange(len(self._body))
-        self._body["size"] = [o.size if o.shape.is_bounded else 1.0 for o in self._obstacles]
-        self._radius = np.array([shape.radius for shape in header.obstacles]) * self._body["size"]
+        self._size = np.array([o.size if o.shape.is_bounded else 1.0 for o in self._obstacles])
+        self._parts = [self._parts_of(k, shape, len(header.shapes) + k) for k, shape in enumerate(header.obstacles)]
         self._colour = np.array([parse(said.colour) for said in scene.obstacles]).reshape(-1, 3)
         self._opacity = np.array([said.opacity for said in scene.obstacles])
         self.opaque = np.flatnonzero(self._opacity == 1.0)
         self.clear = np.flatnonzero((self._opacity > 0.0) & (self._opacity < 1.0))
 
+    def _parts_of(self, k: int, shape: Shape, row: int) -> _Parts:
+        """What obstacle ``k`` is drawn as, whose shape has a ``row`` of the table: that, or the triangles of a mesh."""
+        shapes, size, middle = self.tables.shapes.shape, self._size[k], np.zeros((1, 3))
+        rows = np.array([row])
+        if not shape.is_convex:
+            rows = np.arange(shapes["first_triangle"][row], shapes["last_triangle"][row])
+            middle = size * shape.vertices[shape.triangles].mean(axis=1)
+        body = np.zeros(len(rows), dtype=BODY)
+        body["shape"], body["size"] = rows, size
+        return _Parts(middle, body, shapes["radius"][rows] * size)
+
     def instances(self, which: np.ndarray, time: float) -> Instances:
-        """The obstacles ``which`` (k,) at a time [s]."""
+        """The obstacles ``which`` (k,) at a time [s]; each triangle of a mesh is one of them by itself."""
         pose = poses_at(self._obstacles, time)[which]
-        tables = GeometryTables(self.tables.shapes, self._body[which], self._radius[which], np.zeros(len(which)))
-        position, orientation = (np.ascontiguousarray(pose[name]) for name in ("position", "orientation"))
-        return Instances(position, orientation, tables, which)
+        parts = [self._parts[k] for k in which.tolist()]
+        each = np.repeat(np.arange(len(which)), [len(part.body) for part in parts])
+        body = np.concatenate([np.zeros(0, dtype=BODY), *(part.body for part in parts)])
+        middle = np.concatenate([np.zeros((0, 3)), *(part.middle for part in parts)])
+        radius = np.concatenate([np.zeros(0), *(part.radius for part in parts)])
+        orientation = pose["orientation"][each]
+        position = pose["position"][each] + (rotations_of(orientation).apply(middle) if len(each) else middle)
+        return Instances(
+            position, orientation, GeometryTables(self.tables.shapes, body, radius, np.zeros(len(each))), which[each]
+        )
 
     def amid(self, particles: Instances, time: float) -> Instances:
         """Instances of particles, and after them the opaque obstacles, whose source they are, at a time [s]."""
@@ -56,15 +85,27 @@ class Scenery:
             np.concatenate([particles.position, others.position]),
             np.concatenate([particles.orientation, others.orientation]),
             joined(particles.tables, others.tables),
-            np.concatenate([source, self.opaque]),
+            np.concatenate([source, others.source]),
         )
+
+    def casting(self, instances: Instances, behind: np.ndarray) -> Instances:
+        """Instances as they cast shadows: triangles, which have no thickness, from ``behind`` (3,) themselves [m]."""
+        kind = self.tables.shapes.shape["kind"][instances.tables.body["shape"]]
+        if not (kind == TRIANGLE).any():
+            return instances
+        return instances._replace(position=instances.position + (kind == TRIANGLE)[:, None] * behind)
 
     def colours(self, which: np.ndarray) -> np.ndarray:
         """Linear RGB (k, 3) of the obstacles ``which`` (k,)."""
         return self._colour[which]
 
     def seen_through(
-        self, colours: np.ndarray, depth: np.ndarray, panes: VisibilityBuffer, pane_colours: np.ndarray
+        self,
+        colours: np.ndarray,
+        depth: np.ndarray,
+        panes: Instances,
+        seen: VisibilityBuffer,
+        pane_colours: np.ndarray,
     ) -> np.ndarray:
         """A picture with the nearest of the clear obstacles before what is in it.
 
@@ -74,11 +115,13 @@ class Scenery:
             The picture without them, and of them.
         depth : (h, w) float32
             Inverse depth of what is in the picture [1/m].
-        panes : VisibilityBuffer
-            Which of the ``clear`` is seen where.
+        panes : Instances
+            The ``clear`` ones.
+        seen : VisibilityBuffer
+            Which of them is seen where.
         """
-        before = (panes.id >= 0) & (panes.inverse_depth > depth)
-        share = self._opacity[self.clear][panes.id[before]][:, None]
+        before = (seen.id >= 0) & (seen.inverse_depth > depth)
+        share = self._opacity[panes.bodies(seen.id[before])][:, None]
         mixed = colours.copy()
         mixed[before] = np.rint(share * pane_colours[before] + (1.0 - share) * colours[before])
         return mixed

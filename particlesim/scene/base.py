@@ -119,26 +119,45 @@ def in_time(keys: list[Any]) -> list[Any]:
 # The folder that paths in a scene start at; None for a scene that was stored, whose files need not be there any more.
 _folder: ContextVar[Path | None] = ContextVar("folder", default=Path())
 
+# Whether it is that of a scene file, which may have come from anywhere.
+_of_file: ContextVar[bool] = ContextVar("of_file", default=False)
+
 
 @contextmanager
-def paths_from(folder: Path | None) -> Iterator[None]:
+def paths_from(folder: Path | None, of_file: bool = False) -> Iterator[None]:
     """Let paths in scenes that are made in the ``with`` block start at a folder; None: as they are, unseen."""
-    token = _folder.set(folder)
+    tokens = _folder.set(folder), _of_file.set(of_file)
     try:
         yield
     finally:
-        _folder.reset(token)
+        _folder.reset(tokens[0])
+        _of_file.reset(tokens[1])
 
 
-def mesh_file(path: Path) -> Path:
-    """The path of a mesh from the folder of its scene. ValueError if there is no such file, or not one that is read."""
+def existing_file(path: Path) -> Path:
+    """The path of a file from the folder of its scene. ValueError if there is no such file."""
     folder = _folder.get()
     if folder is None:
         return path
     if not (folder / path).is_file():
         raise ValueError("is a folder" if (folder / path).is_dir() else "no such file")
-    check_mesh_file(folder / path)
     return folder / path
+
+
+def mesh_file(path: Path) -> Path:
+    """As ``existing_file``, of a mesh. ValueError if it is not one that is read."""
+    found = existing_file(path)
+    if _folder.get() is not None:
+        check_mesh_file(found)
+    return found
+
+
+def file_within(path: Path) -> Path:
+    """The path of a file that exists. ValueError if a scene file names it that is neither in its folder nor below."""
+    folder = _folder.get()
+    if folder is not None and _of_file.get() and not path.resolve().is_relative_to(folder.resolve()):
+        raise ValueError("is outside the scene's folder")
+    return path
 
 
 def shorthand(

@@ -39,7 +39,7 @@ def load_table(path: str | Path) -> dict[str, Any]:
 def parse_scene(table: dict[str, Any], path: str | Path | None = None) -> Scene:
     """The scene that a table of plain values describes; paths in it start at the folder of ``path``, if given."""
     try:
-        with paths_from(Path(path).parent if path else Path()):
+        with paths_from(Path(path).parent if path else Path(), of_file=path is not None):
             return Scene(**table)
     except SceneError as error:
         raise error if path is None else error.within(path) from None

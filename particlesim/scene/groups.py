@@ -98,7 +98,7 @@ class PyramidShape(Model):
 
 # What the numbers of a mesh file are in, which the file does not say.
 _AnyUnit: Any = Literal.__getitem__(tuple(UNITS))
-_Unit = Annotated[_AnyUnit, one_of(*UNITS)]
+Unit = Annotated[_AnyUnit, one_of(*UNITS)]
 
 
 class MeshShape(Model):
@@ -106,11 +106,12 @@ class MeshShape(Model):
 
     kind: Literal["mesh"]
     file: Annotated[File, AfterValidator(mesh_file)]
-    unit: _Unit = "m"
+    unit: Unit = "m"
     rounding: Rounding = 0.0
 
 
-Shapes = SphereShape | CapsuleShape | CylinderShape | ConeShape | PolyhedronShape | BoxShape | PyramidShape | MeshShape
+Solids = SphereShape | CapsuleShape | CylinderShape | ConeShape | PolyhedronShape | BoxShape | PyramidShape
+Shapes = Solids | MeshShape
 _Shapes = Annotated[Shapes, Field(discriminator="kind")]
 AnyShape = Annotated[
     _Shapes,

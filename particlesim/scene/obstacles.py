@@ -8,18 +8,23 @@ from pydantic import AfterValidator, Field
 
 from particlesim.scene.base import (
     Colour,
+    File,
     Finite,
     Fraction,
     Model,
     NotNegative,
     Positive,
+    PositiveVector,
     Text,
     Timed,
     Vector,
+    existing_file,
+    file_within,
     in_time,
+    mesh_file,
     shorthand,
 )
-from particlesim.scene.groups import Shapes
+from particlesim.scene.groups import Solids, Unit
 from particlesim.scene.placements import Orientation, not_zero
 from particlesim.scene.surface import Surface
 
@@ -33,7 +38,32 @@ class PlaneShape(Model):
     normal: Direction = (0.0, 0.0, 1.0)
 
 
-_ObstacleShapes = Annotated[PlaneShape | Shapes, Field(discriminator="kind")]
+class SurfaceShape(Model):
+    """The triangles of an STL, OBJ or PLY file as they are, open or closed, times ``scale``; they have two sides.
+
+    Its position is where the origin of the file is.
+    """
+
+    kind: Literal["mesh"]
+    file: Annotated[File, AfterValidator(mesh_file), AfterValidator(file_within)]
+    unit: Unit = "m"
+    scale: Positive = 1.0
+
+
+class HeightfieldShape(Model):
+    """Heights on a grid, from a numpy array (.npy) or a picture (.png, black is 0 and white is 1), about its middle.
+
+    ``size`` is how far it goes along x (columns) and y (rows, the first at the far end), and the height of 1 [m].
+    """
+
+    kind: Literal["heightfield"]
+    file: Annotated[File, AfterValidator(existing_file), AfterValidator(file_within)]
+    size: PositiveVector
+
+
+Surfaces = SurfaceShape | HeightfieldShape
+
+_ObstacleShapes = Annotated[PlaneShape | Solids | Surfaces, Field(discriminator="kind")]
 ObstacleShape = Annotated[
     _ObstacleShapes,
     shorthand(
@@ -99,7 +129,7 @@ class Obstacle(Surface):
     name: Text | None = None
     shape: ObstacleShape
     size: Positive = 1.0  # factor on the shape
-    position: Vector = (0.0, 0.0, 0.0)  # of its centroid, or of a point of the plane [m]
+    position: Vector = (0.0, 0.0, 0.0)  # of its centroid, a point of the plane, or the origin of a mesh [m]
     orientation: Orientation = (1.0, 0.0, 0.0, 0.0)
     colour: Colour = "#8899aa"
     opacity: Fraction = 1.0  # 0 is not drawn

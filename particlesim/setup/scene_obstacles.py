@@ -14,11 +14,19 @@ from particlesim.geometry.shapes import Shape, drawn_hull, half_space
 from particlesim.model.materials import Material
 from particlesim.scene import Scene
 from particlesim.scene.file import SceneError
-from particlesim.scene.obstacles import KeysMotion, Motion, PlaneShape, SpinMotion, VibrateMotion
+from particlesim.scene.obstacles import (
+    HeightfieldShape,
+    KeysMotion,
+    Motion,
+    PlaneShape,
+    SpinMotion,
+    SurfaceShape,
+    VibrateMotion,
+)
 from particlesim.scene.surface import HasSurface
 from particlesim.setup.obstacles import Obstacle, Piece, poses_at
 from particlesim.setup.orientations import of_body_axes, quaternion_of
-from particlesim.setup.shape_reading import shape_of
+from particlesim.setup.shape_reading import shape_of, surface_of
 
 # A plane is drawn as a slab of this part of the world's longest edge.
 _SLAB = 0.01
@@ -53,6 +61,8 @@ def _obstacle(scene: Scene, k: int, known: Shape | None) -> Obstacle:
     said = scene.obstacles[k]
     if isinstance(said.shape, PlaneShape):
         shape = half_space(_unit(said.shape.normal))
+    elif isinstance(said.shape, SurfaceShape | HeightfieldShape):
+        shape = known or surface_of(said.shape, f"obstacles[{k}].shape")
     else:
         shape = known or shape_of(said.shape, f"obstacles[{k}].shape")
     orientation = of_body_axes(quaternion_of(said.orientation), shape)

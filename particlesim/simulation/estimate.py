@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from particlesim.simulation.simulation import MOST_STEPS, Simulation
 # Seconds for which steps are measured, of which one may take longer.
 _MEASURED = 1.0
 
+# A mesh so many times as large as the world, or as much smaller, is likely in another unit.
+_ODD_SIZE = 100.0
+
 # Bytes of the process before any particle: interpreter, numpy, numba, compiled kernels, OpenGL.
 _BYTES_OF_PROCESS = 400e6
 
@@ -31,6 +35,7 @@ def estimate(scene: Scene) -> list[tuple[str, str]]:
     return [
         *([("title", scene.title)] if scene.title else []),
         *_particle_rows(simulation),
+        *_mesh_rows(simulation),
         ("world", f"{' x '.join(f'{edge:g}' for edge in world.size)} m, {', '.join(world.boundary)}"),
         ("volume fraction", f"{_volume(simulation) / math.prod(world.size):.3g}"),
         ("broad phase", scene.solver.broad_phase.kind),
@@ -80,6 +85,29 @@ def _particle_rows(simulation: Simulation) -> list[tuple[str, str]]:
             (f"  {group.name or simulation.scene.key(g)}", _group(simulation, members) if len(members) else "none")
         )
     return rows
+
+
+def _mesh_rows(simulation: Simulation) -> list[tuple[str, str]]:
+    """What obstacles that are meshes amount to, and what is odd about each."""
+    scene, rows = simulation.scene, []
+    for k, (said, shape) in enumerate(zip(scene.obstacles, simulation.model.obstacle_shapes, strict=True)):
+        if shape.is_convex:
+            continue
+        extent = np.ptp(shape.vertices, axis=0) * said.size
+        spans = " x ".join(f"{length:.3g}" for length in extent)
+        name = said.name or f"obstacles[{k}]"
+        rows.append((f"  {name}", f"{len(shape.triangles):,} triangles, {spans} m"))
+        rows += [("    odd", remark) for remark in (*shape.remarks, *_size_remarks(extent, scene.world.size))]
+    return [("meshes", f"{len({name for name, _ in rows if name != '    odd'}):,}"), *rows] if rows else []
+
+
+def _size_remarks(extent: np.ndarray, world: Sequence[float]) -> list[str]:
+    """What is odd about how large a mesh is in a world [m]."""
+    factor = float(extent.max() / max(world))
+    if 1.0 / _ODD_SIZE < factor < _ODD_SIZE:
+        return []
+    times = f"{factor:,.0f} times as large as" if factor > 1.0 else f"{1.0 / factor:,.0f} times smaller than"
+    return [f"{times} the world: is its file in the unit that its shape says?"]
 
 
 def _group(simulation: Simulation, members: np.ndarray) -> str:

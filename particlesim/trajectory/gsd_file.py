@@ -19,7 +19,7 @@ import numpy as np
 
 from particlesim.core.rotations import conjugates, quaternion_products
 from particlesim.geometry.convex_hull import hull_polygons
-from particlesim.geometry.shapes import Shape, capsule, drawn_hull, principal_hull, sphere
+from particlesim.geometry.shapes import Shape, capsule, drawn_hull, principal_hull, sphere, tree_mesh
 from particlesim.scene import Scene
 from particlesim.scene.file import stored_scene
 from particlesim.trajectory.foreign_gsd import FRAME_RATE, Foreign, check_same_particles, read_foreign
@@ -311,8 +311,7 @@ def _header_log(header: Header, changing: bool) -> dict[str, np.ndarray]:
         }
         for s in header.shapes
     ]
-    drawn = "name", "vertices", "rounding", "orientation"
-    obstacles = [{name: _plain(getattr(s, name)) for name in drawn} for s in header.obstacles]
+    obstacles = [{name: _plain(getattr(s, name)) for name in _drawn(s)} for s in header.obstacles]
     return {
         _LOG + "version": np.frombuffer(importlib.metadata.version("particlesim").encode(), dtype=np.uint8),
         _LOG + "scene": np.frombuffer(header.scene_json.encode(), dtype=np.uint8),
@@ -356,9 +355,18 @@ def _read_obstacles(chunks: Chunks) -> list[dict[str, Any]]:
 
 def _read_obstacle(described: dict[str, Any]) -> Shape:
     """A shape that is only drawn, from its core: a point, a segment or a polyhedron."""
+    if "triangles" in described:
+        return tree_mesh(
+            described["name"], np.array(described["vertices"]), np.array(described["triangles"], dtype=np.int64)
+        )
     if len(described["vertices"]) <= 2:
         return _read_shape(described)
     return drawn_hull(**described)
+
+
+def _drawn(shape: Shape) -> tuple[str, ...]:
+    """What is kept of a shape that is only drawn."""
+    return ("name", "vertices", "rounding", "orientation") if shape.is_convex else ("name", "vertices", "triangles")
 
 
 def _plain(value: Any) -> Any:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from particlesim.core.constants import TRIANGLE
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import axpy, cross, dot, load_vec3, norm, scale, set_vec3, store_vec3, sub
 from particlesim.core.parallel import ThreadTeam
@@ -87,8 +88,11 @@ def _fill_polyhedron(placed, shapes, pixels, edge, view, row):
         offset = dot(normal, centre) + face.offset * placed[1]
         if offset < 0.0:
             set_vec3(out.normal, normal)
-            out.facing, out.first, out.last = -dot(normal, centre) / distance, edge, edge + face.last - face.first
-            _fill_edges(placed, (normal, offset), face, shapes, pixels, view.edge, edge)
+            out.facing, out.first, out.last = -dot(normal, centre) / distance, edge, edge
+            # The edges of a mesh's triangles are inner ones: they are not to be seen.
+            if shape.kind != TRIANGLE:
+                out.last += face.last - face.first
+                _fill_edges(placed, (normal, offset), face, shapes, pixels, view.edge, edge)
         edge += face.last - face.first
         row += 1
 
