@@ -154,6 +154,11 @@ LEAST_PART = 1e-6
 RESTING_PARALLEL_TOLERANCE = 1e-2
 MAX_PARALLEL_TOLERANCE = 0.2
 
+# Normals of triangles of a mesh that differ by less are one in a lasting contact, and planes of them that are apart by
+# less than four times this fraction of the bounding radius [sine, 1]: files hold six digits. Larger: gentle slopes are
+# steps of that height; smaller: a flat face of many triangles is as many contacts.
+SAME_PATCH_SINE = 1e-5
+
 # Faces and edges reach this fraction of the inscribed radius beyond their borders at most [1]: what may slide there.
 MANIFOLD_MARGIN = 0.02
 

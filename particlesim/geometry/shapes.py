@@ -32,8 +32,8 @@ from particlesim.geometry.mass_properties import (
     rounded_mass_properties,
 )
 from particlesim.geometry.mesh_file import mesh_vertices
-from particlesim.geometry.triangle_surface import surface_of_triangles
 from particlesim.geometry.tolerances import MAX_MESH_VERTICES, MAX_TRIANGLES
+from particlesim.geometry.triangle_surface import surface_of_triangles
 from particlesim.geometry.triangle_tree import tree_order
 
 _UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])

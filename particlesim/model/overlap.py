@@ -35,7 +35,7 @@ def overlaps_any(shapes, meshes, a, point, others, period, points):
         if dot(offset, offset) > reach * reach:
             continue
         if meshes is not None and is_mesh(shapes, b.shape_row):
-            if mesh_separation(shapes, meshes, placed_a, placed(b), offset, points) <= 0.0:
+            if mesh_separation(shapes, meshes, placed_a, placed(b), offset, points)[0] <= 0.0:
                 return True
         elif pair_overlaps(shapes, placed_a, placed(b), offset, points):
             return True
@@ -67,12 +67,12 @@ def put_where_free(system, others, count, bodies, proposals):
 
 
 @kernel
-def _separation(shapes, meshes, a, b, offset, points):
-    """Separation of a convex shape from another, or from a mesh, both placed [m] (see ``mesh_separation``)."""
+def separation_along(shapes, meshes, a, b, offset, points):
+    """Separation and normal of a convex shape and another, or a mesh, both placed (see ``mesh_separation``)."""
     if meshes is not None and is_mesh(shapes, b[0]):
         return mesh_separation(shapes, meshes, a, b, offset, points)
-    separation, _, _ = pair_separation(shapes, a, b, offset, NO_SIMPLEX, points)
-    return separation
+    separation, normal, _ = pair_separation(shapes, a, b, offset, NO_SIMPLEX, points)
+    return separation, normal
 
 
 @entry_kernel
@@ -81,7 +81,7 @@ def separation_of(system, i, j):
     system = without_refcounts(system)
     points = np.empty((MAX_MANIFOLD, 3))
     a, b = placed(system.body[i]), placed(system.body[j])
-    return _separation(system.shapes, system.meshes, a, b, offset_of(system, i, j), points)
+    return separation_along(system.shapes, system.meshes, a, b, offset_of(system, i, j), points)[0]
 
 
 @entry_kernel

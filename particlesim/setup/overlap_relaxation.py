@@ -17,11 +17,10 @@ from particlesim.core.constants import MAX_MANIFOLD
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import axpy, dot, scale, set_vec3, sub, to_vec3
 from particlesim.geometry.mesh_table import MeshTable
-from particlesim.geometry.narrow_phase.gjk import NO_SIMPLEX
-from particlesim.geometry.narrow_phase.pair import pair_separation
 from particlesim.geometry.shape_table import ShapeTable
 from particlesim.model.bodies import placed
 from particlesim.model.domain import nearest_image
+from particlesim.model.overlap import separation_along
 from particlesim.setup.random_insertion import Insertion
 
 # The shapes that there are, the meshes among them, and the obstacles, (k,) BODY.
@@ -86,7 +85,7 @@ def push_apart(
 
 
 @kernel
-def _lack(table, a, b, offset, thickness, points):
+def _lack(table, meshes, a, b, offset, thickness, points):
     """How deep a and b overlap, as a fraction of their ``thickness``, and by how much a is to move [m], as a vector.
 
     ``thickness`` is the sum of the inscribed radii; b is at ``offset`` from a, and does not move.
@@ -94,7 +93,7 @@ def _lack(table, a, b, offset, thickness, points):
     reach = a.radius + b.radius
     depth, way = 0.0, (0.0, 0.0, 0.0)
     if dot(offset, offset) < reach * reach:
-        separation, normal, _ = pair_separation(table, placed(a), placed(b), offset, NO_SIMPLEX, points)
+        separation, normal = separation_along(table, meshes, placed(a), placed(b), offset, points)
         if separation < 0.0:
             depth = -separation / thickness
             way = scale(normal, _OVERRELAXATION * (separation - _GAP * thickness))
@@ -107,7 +106,7 @@ def _pass(known, insertion, mobility, pairs):
 
     Returns the sum of the overlaps that were found, as fractions of the inscribed radii.
     """
-    (table, _, obstacles), insertion = without_refcounts(known), without_refcounts(insertion)
+    (table, meshes, obstacles), insertion = without_refcounts(known), without_refcounts(insertion)
     mobility, pairs = without_refcounts(mobility), without_refcounts(pairs)
     body, period, points = insertion.body, to_vec3(insertion.space[0].period), np.empty((MAX_MANIFOLD, 3))
     overlap = 0.0
@@ -116,14 +115,14 @@ def _pass(known, insertion, mobility, pairs):
         for k in range(len(obstacles) if mobility[i] > 0.0 else 0):
             offset = nearest_image(sub(to_vec3(obstacles[k].position), to_vec3(a.position)), period)
             thickness = table.shape[a.shape_row].inradius * a.scale
-            depth, way = _lack(table, a, obstacles[k], offset, thickness, points)
+            depth, way = _lack(table, meshes, a, obstacles[k], offset, thickness, points)
             set_vec3(a.position, axpy(to_vec3(a.position), way, 1.0))
             overlap += depth
     for k in range(len(pairs)):
         a, b = body[pairs[k, 0]], body[pairs[k, 1]]
         offset = nearest_image(sub(to_vec3(b.position), to_vec3(a.position)), period)
         thickness = table.shape[a.shape_row].inradius * a.scale + table.shape[b.shape_row].inradius * b.scale
-        depth, way = _lack(table, a, b, offset, thickness, points)
+        depth, way = _lack(table, None, a, b, offset, thickness, points)
         share = mobility[pairs[k, 0]] / (mobility[pairs[k, 0]] + mobility[pairs[k, 1]])
         set_vec3(a.position, axpy(to_vec3(a.position), way, share))
         set_vec3(b.position, axpy(to_vec3(b.position), way, share - 1.0))

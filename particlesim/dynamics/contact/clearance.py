@@ -24,7 +24,8 @@ from particlesim.core.math3d import (
 )
 from particlesim.dynamics.ccd.swept_bounds import largest_acceleration
 from particlesim.dynamics.settings import CHANGE_HANDED_ON
-from particlesim.geometry.support import half_space_plane, is_half_space, is_sphere
+from particlesim.geometry.narrow_phase.mesh import is_any_near
+from particlesim.geometry.support import half_space_plane, is_mesh, is_sphere
 from particlesim.model.bodies import KINEMATIC, angular_velocity, placed
 from particlesim.model.domain import nearest_image
 
@@ -33,7 +34,7 @@ from particlesim.model.domain import nearest_image
 def turning_speed(system, spin, i):
     """How fast the surface of a bounded body that is no sphere moves at most by turning [m/s]."""
     shapes, b = system.shapes, system.body[i]
-    still = is_half_space(shapes, b.shape_row) or is_sphere(shapes, b.shape_row)
+    still = i >= system.bounded or is_sphere(shapes, b.shape_row)
     return 0.0 if still else norm(load_vec3(spin, i)) * b.radius
 
 
@@ -65,6 +66,25 @@ def _approach_to_plane(system, spin, i, j, duration):
     return speed if speed > 0.0 and room <= speed * duration else 0.0
 
 
+@kernel
+def _approach_to_mesh(system, meshes, spin, i, j, duration):
+    """How fast surfaces of a particle and a mesh meet at most that may do so in a time [s], 0 if they do not."""
+    a, b = system.body[i], system.body[j]
+    offset = nearest_image(sub(to_vec3(a.position), to_vec3(b.position)), system.domain[0].period)
+    of_mesh = add(to_vec3(b.velocity), cross(load_vec3(spin, j), offset))
+    speed = norm(sub(to_vec3(a.velocity), of_mesh)) + (norm(load_vec3(spin, i)) + norm(load_vec3(spin, j))) * a.radius
+    near = is_any_near(system.shapes, meshes, placed(b), offset, offset, a.radius + speed * duration)
+    return speed if near else 0.0
+
+
+@kernel
+def _approach_to_surroundings(system, meshes, spin, i, j, duration):
+    """How fast a particle nears a half-space or a mesh that it may meet in a time [s], 0 if it does not."""
+    if meshes is not None and is_mesh(system.shapes, system.body[j].shape_row):
+        return _approach_to_mesh(system, meshes, spin, i, j, duration)
+    return _approach_to_plane(system, spin, i, j, duration)
+
+
 @entry_kernel
 def expected_changes(system, neighbours, spin, duration, gain):
     """By how much the surface velocity of each body may change in a step (n,) [m/s]: by ``gain``, or as others push.
@@ -83,7 +103,7 @@ def expected_changes(system, neighbours, spin, duration, gain):
             share = CHANGE_HANDED_ON if j < system.particles else 1.0
             change[i] = max(change[i], share * _approach(system, spin, i, j, duration))
         for j in range(system.bounded, len(system.body)):
-            change[i] = max(change[i], _approach_to_plane(system, spin, i, j, duration))
+            change[i] = max(change[i], _approach_to_surroundings(system, system.meshes, spin, i, j, duration))
         change[i] += gain
     return change
 

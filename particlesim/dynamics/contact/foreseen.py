@@ -7,10 +7,11 @@ from particlesim.core.math3d import axpy, dot, norm, scale, sub
 from particlesim.core.math3d import to_vec3 as vec
 from particlesim.dynamics.contact.clearance import turning_speed
 from particlesim.dynamics.contact.lasting_contacts import reach_of
+from particlesim.dynamics.contact.mesh_ahead import comes_upon_triangle
 from particlesim.dynamics.contact.position_correction import travel
 from particlesim.geometry.narrow_phase.half_space import half_space_separation
 from particlesim.geometry.narrow_phase.pair import pair_nearer
-from particlesim.geometry.support import half_space_plane, is_sphere
+from particlesim.geometry.support import half_space_plane, is_mesh, is_sphere
 from particlesim.model.bodies import angular_velocity, placed
 from particlesim.model.domain import nearest_image
 
@@ -74,6 +75,15 @@ def _meets_plane(system, motion, ahead, i, j):
     return not lossless and before > reach and after < 0.0
 
 
+@kernel
+def _meets_surroundings(system, meshes, motion, ahead, i, j):
+    """Whether a particle is in a half-space or a mesh by the end of the step, unknown to contacts."""
+    if meshes is not None and is_mesh(system.shapes, system.body[j].shape_row):
+        reach, _, lossless = reach_of(system, motion, i, j)
+        return not lossless and comes_upon_triangle(system, meshes, ahead, (i, j), reach)
+    return _meets_plane(system, motion, ahead, i, j)
+
+
 @entry_kernel
 def unforeseen(system, neighbours, motion, search, ahead, carried):
     """Whether any of the bodies that are ``carried`` (n,), obstacles among them, may meet another, unknown to contacts.
@@ -95,6 +105,6 @@ def unforeseen(system, neighbours, motion, search, ahead, carried):
                 if _meet(system, motion, ahead, carried, (i, j), clear):
                     return True
         for j in range(system.bounded, len(system.body)):
-            if carried[i] and _meets_plane(system, motion, ahead, i, j):
+            if carried[i] and _meets_surroundings(system, system.meshes, motion, ahead, i, j):
                 return True
     return False

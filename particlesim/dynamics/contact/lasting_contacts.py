@@ -14,42 +14,38 @@ from particlesim.core.constants import MAX_MANIFOLD
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import (
     add,
+    axpy,
     cross,
     dot,
     grow_records,
-    inverse_rotate,
     load_vec3,
     norm,
-    rotate,
     scale,
     set_vec3,
     store_vec3,
     sub,
-    to_quat,
 )
 from particlesim.core.math3d import to_vec3 as vec
-from particlesim.dynamics.ccd.conservative_advancement import facing_edge
-from particlesim.dynamics.ccd.time_of_impact import sized_core
 from particlesim.dynamics.contact.clearance import turning_speed
-from particlesim.dynamics.contact.contact_records import CONTACT_POINT, CONTACT_TERMS, NOBODY, OF_A, OF_B, OF_EDGES
+from particlesim.dynamics.contact.contact_records import CONTACT_POINT, CONTACT_TERMS, OF_B, OF_EDGES
 from particlesim.dynamics.contact.law import rest_speed, rest_threshold, restitution_of, tangent_of
+from particlesim.dynamics.contact.mesh_patches import MAX_PATCH_POINTS, gather_patches, new_patches, patch_corners
+from particlesim.dynamics.contact.normal_owner import normal_owner, write_edges
 from particlesim.dynamics.settings import (
-    LEVEL_VERTICES,
     LOSSLESS_REST,
     MANIFOLD_MARGIN,
     MAX_PARALLEL_TOLERANCE,
     MAX_TURNING_SLACK,
-    MIN_EDGE_SINE,
     REST_SLACK,
     RESTING_PARALLEL_TOLERANCE,
     RESTING_SUBSTEPS,
     RESTITUTION_THRESHOLD_HEIGHT,
-    SAME_NORMAL,
+    SAME_PATCH_SINE,
 )
 from particlesim.dynamics.solver_state import SolverState
 from particlesim.geometry.narrow_phase.pair import pair_manifold
 from particlesim.geometry.support import is_half_space, is_mesh, is_sphere
-from particlesim.model.bodies import angular_velocity_change, per_mass, placed
+from particlesim.model.bodies import BODY, angular_velocity_change, per_mass, placed
 from particlesim.model.domain import nearest_image
 
 
@@ -176,77 +172,23 @@ def reach_of(system, motion, i, j):
 
 
 @kernel
-def _turning_slack(system, motion, i, j):
+def _turning_slack(system, motion, pair, offset, owner):
     """How far turning may close a gap that the velocities of now do not show [m].
 
-    A point at r from the position of a body that turns at w accelerates by w x (w x r). Half-spaces do not turn, and
-    what comes down on them bends away from them.
+    A point at r from the position of a body that turns at w accelerates by w x (w x r). What comes down on a plane that
+    does not turn bends away from it.
     """
+    i, j = pair
     a, b = system.body[i], system.body[j]
-    if is_half_space(system.shapes, b.shape_row):
+    of_a = 0.0 if is_sphere(system.shapes, a.shape_row) else norm(load_vec3(motion.spin, i))
+    of_b = 0.0 if is_sphere(system.shapes, b.shape_row) else norm(load_vec3(motion.spin, j))
+    if owner == OF_B and (is_half_space(system.shapes, b.shape_row) or (j >= system.bounded and of_b == 0.0)):
         return 0.0
-    turning = 0.0 if is_sphere(system.shapes, a.shape_row) else norm(load_vec3(motion.spin, i))
-    turning += 0.0 if is_sphere(system.shapes, b.shape_row) else norm(load_vec3(motion.spin, j))
-    angle, inradius = turning * motion.duration, min(a.inradius, b.inradius)
     lever = a.radius + b.radius
+    if j >= system.bounded:
+        lever = a.radius if of_b == 0.0 else a.radius + norm(offset)
+    angle, inradius = (of_a + of_b) * motion.duration, min(a.inradius, b.inradius)
     return min(0.5 * angle * angle * lever / RESTING_SUBSTEPS, MAX_TURNING_SLACK * inradius)
-
-
-@kernel
-def _faces(system, b, direction):
-    """Whether a face of a polyhedron has ``direction`` for its normal."""
-    faces, shape, own = (
-        system.shapes.face,
-        system.shapes.shape[b.shape_row],
-        inverse_rotate(to_quat(b.orientation), direction),
-    )
-    found = False
-    for f in range(shape.first_face, shape.last_face):
-        found = found or dot(vec(faces[f].normal), own) > 1.0 - SAME_NORMAL
-    return found
-
-
-@kernel
-def _owner(system, a, b, normal):
-    """Whose face the normal of two bodies belongs to.
-
-    A plane that supports a polyhedron where a sphere is nearest goes on doing so as it turns with the polyhedron.
-    """
-    if is_half_space(system.shapes, b.shape_row):
-        return OF_B
-    sphere_a, sphere_b = is_sphere(system.shapes, a.shape_row), is_sphere(system.shapes, b.shape_row)
-    if sphere_a and sphere_b:
-        return NOBODY
-    if sphere_a or (not sphere_b and _faces(system, b, scale(normal, -1.0))):
-        return OF_B
-    if sphere_b or _faces(system, a, normal):
-        return OF_A
-    return OF_EDGES
-
-
-@kernel
-def _edge_facing(system, b, direction):
-    """The edge of a polyhedron that faces ``direction``, in world axes; (0, 0, 0) if a vertex or a face does."""
-    orientation = to_quat(b.orientation)
-    hull, core = (system.shapes.vertex, system.shapes.link), sized_core(system, b)
-    edge, lag, next_lag = facing_edge(hull, core, inverse_rotate(orientation, direction))
-    level = lag <= LEVEL_VERTICES < next_lag
-    return scale(rotate(orientation, edge), b.scale if level else 0.0)
-
-
-@kernel
-def _write_edges(system, a, b, normal, terms):
-    """Write how a normal turns that stays across the edges of two bodies that cross (see turning_with_edges)."""
-    edge_a, edge_b = _edge_facing(system, a, normal), _edge_facing(system, b, scale(normal, -1.0))
-    across_a, across_b = cross(normal, edge_a), cross(edge_b, normal)
-    area = dot(edge_a, across_b)
-    if abs(area) <= MIN_EDGE_SINE * norm(edge_a) * norm(edge_b):
-        terms.owner = NOBODY
-        return
-    set_vec3(terms.edge_a, edge_a)
-    set_vec3(terms.edge_b, edge_b)
-    set_vec3(terms.with_a, scale(across_b, 1.0 / area))
-    set_vec3(terms.with_b, scale(across_a, 1.0 / area))
 
 
 @kernel
@@ -279,6 +221,31 @@ def _write_point(system, motion, p, terms, pair, arm, offset):
 
 
 @kernel
+def _add_points(system, motion, pair, b, patch, room, found, size):
+    """Add the points of a patch (normal, offset, count, least gap, whether they rebound in full) to ``found``.
+
+    ``b`` is the second body, or of a mesh the triangle. Returns how many there are then; where what rebounds in full is
+    not still, none are added.
+    """
+    normal, offset, count, clear, lossless = patch
+    a, (points, terms) = system.body[pair[0]], found
+    owner = normal_owner(system, a, b, normal)
+    turning = 0.0 if lossless else _turning_slack(system, motion, pair, offset, owner)
+    for k in range(count):
+        p, t = points[size + k], terms[size + k]
+        set_vec3(p.normal, normal)
+        _write_point(system, motion, p, t, pair, load_vec3(room.points, k), offset)
+        if lossless and abs(t.approach) > t.threshold * LOSSLESS_REST:
+            return size
+        t.gap, t.separation = room.gaps[k], clear
+        t.slack, t.owner = turning + REST_SLACK * t.inradius, owner
+        t.round_a, t.round_b = is_sphere(system.shapes, a.shape_row), is_sphere(system.shapes, b.shape_row)
+        if owner == OF_EDGES:
+            write_edges(system, a, b, normal, t)
+    return size + count
+
+
+@kernel
 def add_contact(system, motion, pair, clear, room, found, size):
     """Add the points of a pair of bodies (i, j) that may close to ``found`` (points, terms), which has ``size``.
 
@@ -286,27 +253,72 @@ def add_contact(system, motion, pair, clear, room, found, size):
     must collide as others do: what rebounds in full is in lasting contact only where it is quite still. There must be
     room for MAX_MANIFOLD more.
     """
-    i, j = pair
-    a, b = system.body[i], system.body[j]
-    reach, tilt, lossless = reach_of(system, motion, i, j)
+    a, b = system.body[pair[0]], system.body[pair[1]]
+    reach, tilt, lossless = reach_of(system, motion, pair[0], pair[1])
     if clear > reach:
         return size, clear, lossless
     normal, offset, count, clear = _pair_points(system, a, b, reach, tilt, room)
-    turning = 0.0 if lossless else _turning_slack(system, motion, i, j)
-    owner = _owner(system, a, b, normal) if count > 0 else NOBODY
-    points, terms = found
+    if count == 0:
+        return size, clear, lossless
+    patch = normal, offset, count, clear, lossless
+    return _add_points(system, motion, pair, b, patch, room, found, size), clear, lossless
+
+
+@kernel
+def _patch_points(patches, k, inradius, clear, room):
+    """Write the points of patch k on the particle's surface, and their gaps; how many there are.
+
+    What seems deeper than any triangle is lies beside the mesh.
+    """
+    slope, kept, count = RESTITUTION_THRESHOLD_HEIGHT * inradius, np.empty((MAX_MANIFOLD, 4)), 0
+    normal, nearest = load_vec3(patches.normal, k), patches.nearest[k]
+    for m in range(patch_corners(patches, k, kept)):
+        if kept[m, 3] >= clear - slope:
+            store_vec3(room.points, count, axpy(load_vec3(kept, m), normal, -0.5 * kept[m, 3]))
+            room.gaps[count] = kept[m, 3]
+            count += 1
+    if count > 0 and nearest[3] >= clear - slope:
+        middle = axpy((nearest[0], nearest[1], nearest[2]), normal, -0.5 * nearest[3])
+        count = _with_nearest(room, count, middle, nearest[3], 0.0)
+    return count
+
+
+@kernel
+def _add_mesh_contact(system, meshes, motion, pair, room, found, size):
+    """As ``add_contact``, of a particle and a mesh, but for how far apart they are. Room: for MAX_PATCH_POINTS more."""
+    i, j = pair
+    a, begin = system.body[i], size
+    reach, tilt, lossless = reach_of(system, motion, i, j)
+    limits, patches = (reach, tilt, min(reach, MANIFOLD_MARGIN * a.inradius)), new_patches()
+    offset, count, clear = gather_patches(system, meshes, a, system.body[j], limits, SAME_PATCH_SINE, patches)
+    triangle = np.empty(1, dtype=BODY)
+    triangle[0] = system.body[j]
     for k in range(count):
-        p, t = points[size + k], terms[size + k]
-        set_vec3(p.normal, normal)
-        _write_point(system, motion, p, t, pair, load_vec3(room.points, k), offset)
-        if lossless and abs(t.approach) > t.threshold * LOSSLESS_REST:
-            return size, clear, True
-        t.gap, t.separation = room.gaps[k], clear
-        t.slack, t.owner = turning + REST_SLACK * t.inradius, owner
-        t.round_a, t.round_b = is_sphere(system.shapes, a.shape_row), is_sphere(system.shapes, b.shape_row)
-        if owner == OF_EDGES:
-            _write_edges(system, a, b, normal, t)
-    return size + count, clear, lossless
+        triangle[0].shape_row = patches.row[k]
+        points = _patch_points(patches, k, a.inradius, clear, room)
+        patch = load_vec3(patches.normal, k), offset, points, clear, lossless
+        before = size
+        size = _add_points(system, motion, pair, triangle[0], patch, room, found, size)
+        if points > 0 and size == before:
+            return begin, lossless
+    return size, lossless
+
+
+@kernel
+def _add_surroundings(system, meshes, motion, pair, room, found, size):
+    """As ``add_contact``, of a particle and a half-space or a mesh, but for how far apart they are."""
+    if meshes is not None and is_mesh(system.shapes, system.body[pair[1]].shape_row):
+        return _add_mesh_contact(system, meshes, motion, pair, room, found, size)
+    size, _, loose = add_contact(system, motion, pair, -np.inf, room, found, size)
+    return size, loose
+
+
+@kernel
+def _most_points(meshes):
+    """How many contact points there may be between two bodies."""
+    if meshes is None:
+        return MAX_MANIFOLD
+    return MAX_PATCH_POINTS
 
 
 @entry_kernel
@@ -317,17 +329,16 @@ def contacts_of(system, neighbours, motion, search, indices, first, last):
     """
     system, neighbours, motion, search, indices = without_refcounts((system, neighbours, motion, search, indices))
     room = _Room(np.empty((MAX_MANIFOLD, 3)), np.empty(MAX_MANIFOLD))
-    points, terms = np.empty(64, dtype=CONTACT_POINT), np.empty(64, dtype=CONTACT_TERMS)
+    most = _most_points(system.meshes)
+    points, terms = np.empty(8 * most, dtype=CONTACT_POINT), np.empty(8 * most, dtype=CONTACT_TERMS)
     size = 0
     for k in range(first, last):
         i = indices[k]
         place, now = neighbours.place[i], search.round[i]
         for j in range(system.bounded, len(system.body)):
-            if is_mesh(system.shapes, system.body[j].shape_row):
-                continue
-            if size + MAX_MANIFOLD > len(points):
+            if size + most > len(points):
                 points, terms = grow_records(points), grow_records(terms)
-            size, _, loose = add_contact(system, motion, (i, j), -np.inf, room, (points, terms), size)
+            size, loose = _add_surroundings(system, system.meshes, motion, (i, j), room, (points, terms), size)
             search.loose[i] |= loose
         for near in range(neighbours.start[place], neighbours.start[place + 1]):
             j = neighbours.body[neighbours.other[near]]
@@ -367,14 +378,15 @@ def resting_on_obstacles(system, neighbours, motion, pulled, rests, first, last)
     system, neighbours, motion, rests = without_refcounts((system, neighbours, motion, rests))
     pulls, ahead = pulled
     room = _Room(np.empty((MAX_MANIFOLD, 3)), np.empty(MAX_MANIFOLD))
-    points, terms = np.empty(MAX_MANIFOLD, dtype=CONTACT_POINT), np.empty(MAX_MANIFOLD, dtype=CONTACT_TERMS)
+    most = _most_points(system.meshes)
+    points, terms = np.empty(most, dtype=CONTACT_POINT), np.empty(most, dtype=CONTACT_TERMS)
     gravity = vec(system.domain[0].gravity)
     for i in range(first, last):
         pull = load_vec3(pulls, i)
         lead = scale(sub(pull, gravity), ahead)
         for j in range(system.bounded, len(system.body)):
-            if not rests[i] and not is_mesh(system.shapes, system.body[j].shape_row):
-                size, _, _ = add_contact(system, motion, (i, j), -np.inf, room, (points, terms), 0)
+            if not rests[i]:
+                size, _ = _add_surroundings(system, system.meshes, motion, (i, j), room, (points, terms), 0)
                 rests[i] = _rests(terms, points, size, pull, lead)
         place = neighbours.place[i]
         for near in range(neighbours.start[place], neighbours.start[place + 1]):

@@ -9,7 +9,7 @@ farther that way from there: none of the triangles there leans over to where the
 import math
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import dot, inverse_rotate, load_vec3, norm, scale, sub
+from particlesim.core.math3d import dot, inverse_rotate, load_vec3, norm, scale, sub, to_vec3
 from particlesim.geometry.narrow_phase.gjk import NO_SIMPLEX
 from particlesim.geometry.narrow_phase.pair import pair_separation
 from particlesim.geometry.support import bounding_radius
@@ -116,17 +116,32 @@ def has_normal(table, meshes, row, direction):
 
 
 @kernel
+def face_towards(table, row, direction):
+    """The unit normal of the triangle in a ``row`` of the shape table, on the side that ``direction`` points to."""
+    normal = to_vec3(table.face[table.shape[row].first_face].normal)
+    return normal if dot(normal, direction) >= 0.0 else scale(normal, -1.0)
+
+
+@kernel
 def mesh_separation(table, meshes, a, b, offset, points):
-    """How deep a convex shape is in mesh b at ``offset`` from it, both placed, as a separation below 0.
+    """How deep a convex shape is in mesh b at ``offset`` from it, both placed, as a separation below 0; the normal.
 
     Apart, it is some number above 0: only triangles near the shape are looked at. ``points`` is scratch.
     """
     centre = scale(offset, -1.0)
     box = box_about(b, centre, centre, bounding_radius(table, a))
-    least = math.inf
+    least, deepest = math.inf, (0.0, 0.0, 0.0)
     place, row = next_triangle(table, meshes, b[0], (0, 0), box)
     while row >= 0:
-        found, _, _ = pair_separation(table, a, (row, b[1], b[2]), offset, NO_SIMPLEX, points)
-        least = min(least, found)
+        found, normal, _ = pair_separation(table, a, (row, b[1], b[2]), offset, NO_SIMPLEX, points)
+        if found < least:
+            least, deepest = found, normal
         place, row = next_triangle(table, meshes, b[0], place, box)
-    return least
+    return least, deepest
+
+
+@kernel
+def is_any_near(table, meshes, b, start, end, reach):
+    """Whether the box of any triangle of a placed mesh is within ``reach`` of a segment (see ``box_about``)."""
+    _, row = next_triangle(table, meshes, b[0], (0, 0), box_about(b, start, end, reach))
+    return row >= 0

@@ -4,7 +4,7 @@ import numpy as np
 
 from particlesim.core.constants import MAX_MANIFOLD
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import cross, dot, load_vec3, norm, store_vec3, sub
+from particlesim.core.math3d import cross, dot, load_vec3, norm, sub
 from particlesim.geometry.tolerances import PATCH_CORNER
 
 # Points that are gathered before those are dropped which are no corners.
@@ -31,9 +31,9 @@ def _is_next(normal, here, best, other, near):
 def corners_of(points, count, normal):
     """Move the corners of the convex hull of ``count`` points in a plane across ``normal`` to the front; how many.
 
-    What stands out by less than rounding is no corner.
+    ``points`` (n, 3 or more), with whatever else is known of each. What stands out by less than rounding is no corner.
     """
-    hull = np.empty((count, 3))
+    hull = np.empty((count, points.shape[1]))
     start, extent = 0, 0.0
     first = load_vec3(points, 0)
     for k in range(1, count):
@@ -42,7 +42,7 @@ def corners_of(points, count, normal):
             start, extent = k, distance
     near, size, here = PATCH_CORNER * extent, 0, start
     while size < count and (size == 0 or here != start):
-        store_vec3(hull, size, load_vec3(points, here))
+        hull[size] = points[here]
         size += 1
         best = here
         for k in range(count):
@@ -51,8 +51,7 @@ def corners_of(points, count, normal):
         if best == here or norm(sub(load_vec3(points, best), load_vec3(points, start))) <= near:
             break
         here = best
-    for k in range(size):
-        store_vec3(points, k, load_vec3(hull, k))
+    points[:size] = hull[:size]
     return size
 
 
@@ -61,5 +60,6 @@ def keep_some(points, count, kept):
     """Write ``count`` points, or as many of them as a manifold keeps, evenly spread, to ``kept``; returns how many."""
     size = min(count, MAX_MANIFOLD)
     for k in range(size):
-        store_vec3(kept, k, load_vec3(points, k * count // size))
+        for column in range(kept.shape[1]):
+            kept[k, column] = points[k * count // size, column]
     return size
