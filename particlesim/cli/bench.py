@@ -1,10 +1,10 @@
-"""The benchmarks: whole time steps, heaps that come to rest, and pictures."""
+"""The benchmarks: whole time steps, heaps that come to rest, meshes, and pictures."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from particlesim.cli.tables import print_heaps, print_pictures, print_speeds
+from particlesim.cli.tables import print_fields, print_heaps, print_pictures, print_speeds
 
 
 def measure_steps(large: bool, figures: Path | None, quiet: bool, threads: int | None) -> None:
@@ -44,3 +44,16 @@ def measure_settling(large: bool, figures: Path | None, quiet: bool, threads: in
         write(figures, heaps)
     if not quiet:
         print_heaps(heaps)
+
+
+def measure_obstacles(figures: Path | None, quiet: bool, threads: int | None) -> None:
+    """The same of meshes of more and more triangles."""
+    from particlesim.benchmarks.obstacles import SQUARES, run, write  # noqa: PLC0415
+    from particlesim.cli.progress import shown_progress  # noqa: PLC0415
+
+    with shown_progress(quiet, "measurement") as progress:
+        fields = list(run(SQUARES, threads, progress))
+    if figures is not None:
+        write(figures, fields)
+    if not quiet:
+        print_fields(fields)

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 import typer.core
 
-from particlesim.cli.bench import measure_drawing, measure_settling, measure_steps
+from particlesim.cli.bench import measure_drawing, measure_obstacles, measure_settling, measure_steps
 from particlesim.cli.clean import clean
 from particlesim.cli.errors import fail, one_line_errors
 from particlesim.cli.export import export
@@ -193,6 +193,7 @@ def bench(
     large: Annotated[bool, typer.Option("--large", help="Measure a million particles as well.")] = False,
     drawing: Annotated[bool, typer.Option("--drawing", help="Measure the drawing of pictures instead.")] = False,
     resting: Annotated[bool, typer.Option("--resting", help="Measure heaps that come to rest instead.")] = False,
+    obstacles: Annotated[bool, typer.Option("--obstacles", help="Measure meshes of triangles instead.")] = False,
     figures: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the figures to a file as well.")
     ] = None,
@@ -206,6 +207,8 @@ def bench(
     With --drawing, measure how long a picture of 1280x720 pixels takes, beside VTK where it is installed.
 
     With --resting, measure how long mixed bodies that are dropped into a box take, beside Rapier where it is installed.
+
+    With --obstacles, measure what a step takes of bodies on meshes of a hundred to a hundred thousand triangles.
     """
     with one_line_errors(Path("bench")):
         if figures is not None:
@@ -214,6 +217,8 @@ def bench(
             measure_drawing(large, figures, quiet)
         elif resting:
             measure_settling(large, figures, quiet, threads)
+        elif obstacles:
+            measure_obstacles(figures, quiet, threads)
         else:
             measure_steps(large, figures, quiet, threads)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from particlesim.benchmarks.broad_phase.command import Report
     from particlesim.benchmarks.drawing import Drawn
+    from particlesim.benchmarks.obstacles import OnField
     from particlesim.benchmarks.settling import Settled
     from particlesim.benchmarks.steps import Speed
     from particlesim.jobs.summary import Summary
@@ -108,6 +109,23 @@ def print_heaps(heaps: list[Settled]) -> None:
     console = Console()
     console.print(table)
     console.print("overlap: the deepest after any piece, in sizes", style="dim", highlight=False)
+
+
+def print_fields(fields: list[OnField]) -> None:
+    """What a benchmark of meshes measured: a row for each."""
+    from rich.console import Console  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+
+    from particlesim.benchmarks.obstacles import COUNT  # noqa: PLC0415
+
+    title = f"Milliseconds a step of {COUNT} bodies"
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    for name in ("triangles", "falling", "lying", "overlap", "built in"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for of in fields:
+        steps = (f"{1e3 * seconds:.2f}" for seconds in (of.falling, of.lying))
+        table.add_row(f"{of.triangles:,}", *steps, f"{of.overlap:.1e}", f"{of.building:.2f} s")
+    Console().print(table)
 
 
 def print_summary(summary: Summary, path: Path) -> None:
