@@ -1,6 +1,7 @@
 """What lies, slides and rolls on triangle meshes: as on the plane that they are cut out of, against closed forms."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import trimesh
 
 from particlesim.geometry.shapes import half_space, triangle_mesh
 from particlesim.model.materials import Material
+from particlesim.scene.file import load_scene
 from particlesim.setup.build import build
 from particlesim.setup.obstacles import Obstacle, Piece
 from particlesim.simulation.simulation import Simulation
@@ -245,6 +247,16 @@ def test_a_heap_on_a_mesh_does_not_depend_on_broad_phase_or_threads(tmp_path):
     for one in (sim, again):
         one.run(duration=0.2)
     assert again.state_hash() == sim.state_hash()
+
+
+def test_a_hopper_empties_through_its_orifice_and_nowhere_else():
+    """Half of it in 1.5 s: what is not below the orifice is within the funnel."""
+    sim = Simulation(load_scene(Path(__file__).parent.parent / "scenes" / "hopper.toml"))
+    sim.run(duration=1.5)
+    x, y, z = sim.particles.position.T
+    funnel = np.interp(z, [0.04, 0.5], [0.17, 0.5])
+    assert (np.hypot(x, y)[z > -0.04] < funnel[z > -0.04]).all()
+    assert 0.3 < (z < -0.04).mean() < 0.9
 
 
 def test_a_fast_thin_plate_that_spins_onto_a_sheet_stays_on_its_side():
