@@ -8,23 +8,21 @@ the shape and size of every particle, and the ledger of every frame.
 from __future__ import annotations
 
 import functools
-import importlib.metadata
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import gsd.hoomd
 import numpy as np
 
 from particlesim.core.rotations import conjugates, quaternion_products
-from particlesim.geometry.convex_hull import hull_polygons
-from particlesim.geometry.shapes import Shape, capsule, drawn_hull, principal_hull, sphere, tree_mesh
 from particlesim.scene import Scene
 from particlesim.scene.file import stored_scene
 from particlesim.trajectory.foreign_gsd import FRAME_RATE, Foreign, check_same_particles, read_foreign
 from particlesim.trajectory.frames import Frame, Header, Ledger
 from particlesim.trajectory.gsd_chunks import Chunks, TrajectoryError, cut, reading, room_in_index
+from particlesim.trajectory.gsd_header import LOG, OLDER, checked_header, header_log, read_header
 from particlesim.trajectory.gsd_ledger import ledger_log, ledger_names, read_ledger
 from particlesim.trajectory.gsd_types import display_diameters, display_types
 
@@ -33,9 +31,7 @@ if TYPE_CHECKING:
 
     from particlesim.trajectory.analysis.measurements import Measurements
 
-# What the schema does not have is among its logged quantities; text is stored as bytes. Under the second prefix OVITO
-# finds quantities of the particles.
-_LOG = "log/particlesim/"
+# Under this prefix OVITO finds quantities of the particles.
 _IMPACTS = "log/particles/impacts"
 _ID = "log/particles/id"
 
@@ -54,8 +50,6 @@ _UNIT = 1e-3
 
 # Chunks of a frame at most: what the schema has, what we add to the first one, and the ledger.
 _CHUNKS = 32 + len(ledger_names())
-
-_OLDER = "written by an older particlesim; simulate its scene again"
 
 
 class TrajectoryWriter:
@@ -99,13 +93,13 @@ class TrajectoryWriter:
         if self._count == 0:
             particles.types = [name for name, _ in self._types]
             particles.type_shapes = [shape for _, shape in self._types]
-            out.log.update(_logged(_header_log(header, changing=frame.present is not None)))
+            out.log.update(_logged(header_log(header, changing=frame.present is not None)))
         if self._count == 0 or frame.present is not None:
             particles.typeid = self._type_of[ids].astype(np.uint32)
             particles.mass = header.mass[ids].astype(np.float32)
             particles.moment_inertia = header.inertia[ids].astype(np.float32)
             particles.diameter = display_diameters(header)[ids]
-        own = {_IMPACTS: frame.impacts.astype(np.uint32), _LOG + "time": np.array([frame.time])}
+        own = {_IMPACTS: frame.impacts.astype(np.uint32), LOG + "time": np.array([frame.time])}
         if frame.present is not None:
             own[_ID] = ids.astype(np.uint32)
         out.log.update(_logged({**own, **ledger_log(frame.ledger)}))
@@ -136,11 +130,11 @@ class Trajectory:
             with reading(self.path):
                 if not chunks.frames:
                     raise TrajectoryError(f"{path}: has no frames")
-                self._is_own = chunks.has(_LOG + "scene")
+                self._is_own = chunks.has(LOG + "scene")
                 if self._is_own and not all(chunks.has(name) for name in (_IMPACTS, *ledger_names())):
-                    raise TrajectoryError(f"{path}: {_OLDER}")
-                found = Foreign(_read_header(chunks), ()) if self._is_own else read_foreign(chunks)
-                self.header, self.assumed = _checked(found.header), found.assumed
+                    raise TrajectoryError(f"{path}: {OLDER}")
+                found = Foreign(read_header(chunks), ()) if self._is_own else read_foreign(chunks)
+                self.header, self.assumed = checked_header(found.header), found.assumed
         except BaseException:
             chunks.close()
             raise
@@ -226,7 +220,7 @@ class Trajectory:
     @property
     def version(self) -> str | None:
         """The version of particlesim that wrote it; None if it does not say."""
-        name = _LOG + "version"
+        name = LOG + "version"
         with reading(self.path):
             return self._chunks.read(name).tobytes().decode() if self._chunks.has(name) else None
 
@@ -235,7 +229,7 @@ class Trajectory:
         with reading(self.path):
             if not self._is_own:
                 return k / FRAME_RATE
-            return float(self._chunks.rows(_LOG + "time", 1, (0.0,), k)[0, 0])
+            return float(self._chunks.rows(LOG + "time", 1, (0.0,), k)[0, 0])
 
     def ledger(self, k: int) -> Ledger | None:
         """The ledger of frame ``k`` alone, 0 the first; None where the file has none."""
@@ -294,106 +288,6 @@ def open(path: str | Path) -> Trajectory:
         If it cannot be read.
     """
     return Trajectory(path)
-
-
-def _header_log(header: Header, changing: bool) -> dict[str, np.ndarray]:
-    """What the schema has no place for; where numbers are ``changing``, masses of all particles that there ever are."""
-    constants = {"mass": header.mass.astype(np.float32), "inertia": header.inertia.astype(np.float32)}
-    shapes = [
-        {
-            "name": s.name,
-            "vertices": s.vertices.tolist(),
-            "rounding": s.rounding,
-            "orientation": s.orientation.tolist(),
-            "volume": s.volume,
-            "moments": s.moments.tolist(),
-            "described_corners": s.described_corners,
-        }
-        for s in header.shapes
-    ]
-    obstacles = [{name: _plain(getattr(s, name)) for name in _drawn(s)} for s in header.obstacles]
-    return {
-        _LOG + "version": np.frombuffer(importlib.metadata.version("particlesim").encode(), dtype=np.uint8),
-        _LOG + "scene": np.frombuffer(header.scene_json.encode(), dtype=np.uint8),
-        _LOG + "shapes": np.frombuffer(json.dumps(shapes).encode(), dtype=np.uint8),
-        _LOG + "obstacles": np.frombuffer(json.dumps(obstacles).encode(), dtype=np.uint8),
-        _LOG + "shape": header.shape.astype(np.int32),
-        _LOG + "size": header.size,
-        _LOG + "group": header.group.astype(np.int32),
-        **{_LOG + name: values for name, values in constants.items() if changing},
-    }
-
-
-def _read_header(chunks: Chunks) -> Header:
-    described = json.loads(chunks.read(_LOG + "shapes").tobytes())
-    if any("vertices" in shape and "described_corners" not in shape for shape in described):
-        raise TrajectoryError(f"{chunks.path}: {_OLDER}")
-    shape = chunks.read(_LOG + "shape").astype(np.int64)
-    return Header(
-        scene_json=chunks.read(_LOG + "scene").tobytes().decode(),
-        shapes=tuple(_read_shape(s) for s in described),
-        shape=shape,
-        size=chunks.rows(_LOG + "size", len(shape), (1.0,))[:, 0],
-        group=chunks.rows(_LOG + "group", len(shape), (0.0,))[:, 0].astype(np.int64),
-        mass=chunks.rows(_either(chunks, "mass", "particles/mass"), len(shape), (1.0,))[:, 0],
-        inertia=chunks.rows(_either(chunks, "inertia", "particles/moment_inertia"), len(shape), (0.0, 0.0, 0.0)),
-        obstacles=tuple(_read_obstacle(s) for s in _read_obstacles(chunks)),
-    )
-
-
-def _either(chunks: Chunks, name: str, of_schema: str) -> str:
-    """Where a constant of all particles is: where their number stays the same, only as the schema has it."""
-    return _LOG + name if chunks.has(_LOG + name) else of_schema
-
-
-def _read_obstacles(chunks: Chunks) -> list[dict[str, Any]]:
-    """What is said of the obstacles' shapes; nothing in older files."""
-    name = _LOG + "obstacles"
-    found: list[dict[str, Any]] = json.loads(chunks.read(name).tobytes()) if chunks.has(name) else []
-    return found
-
-
-def _read_obstacle(described: dict[str, Any]) -> Shape:
-    """A shape that is only drawn, from its core: a point, a segment or a polyhedron."""
-    if "triangles" in described:
-        return tree_mesh(
-            described["name"], np.array(described["vertices"]), np.array(described["triangles"], dtype=np.int64)
-        )
-    if len(described["vertices"]) <= 2:
-        return _read_shape(described)
-    return drawn_hull(**described)
-
-
-def _drawn(shape: Shape) -> tuple[str, ...]:
-    """What is kept of a shape that is only drawn."""
-    return ("name", "vertices", "rounding", "orientation") if shape.is_convex else ("name", "vertices", "triangles")
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray) else value
-
-
-def _read_shape(described: dict[str, Any]) -> Shape:
-    """A shape from what _header_log says of it: its core is a point, a segment or a polyhedron."""
-    vertices = described["vertices"]
-    if len(vertices) < 2:
-        return sphere()
-    if len(vertices) == 2:
-        return capsule(vertices[1][2] - vertices[0][2])
-    name, rounding = described["name"], described["rounding"]
-    core = hull_polygons(name, np.array(vertices, dtype=np.float64))
-    arrays = {key: np.array(described[key], dtype=np.float64).reshape(-1) for key in ("moments", "orientation")}
-    volume, corners = float(described["volume"]), int(described["described_corners"])
-    return principal_hull(name, core, rounding, volume=volume, described_corners=corners, **arrays)
-
-
-def _checked(header: Header) -> Header:
-    """The header. ValueError if a particle is of a shape that there is not, or of no size or mass."""
-    if not ((header.shape >= 0) & (header.shape < len(header.shapes)) & (header.group >= 0)).all():
-        raise ValueError("particles of unknown shapes or groups")
-    if not ((header.size > 0.0) & (header.mass > 0.0) & (header.inertia >= 0.0).all(axis=1)).all():
-        raise ValueError("particles without size, mass or inertia")
-    return header
 
 
 def _logged(chunks: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
