@@ -86,6 +86,16 @@ def test_random_particles_are_put_beside_the_triangles_of_a_mesh(tmp_path):
     assert len(model.particles) == 80
 
 
+def test_a_crowd_is_pushed_apart_out_of_the_triangles_of_a_mesh(tmp_path):
+    """Above what random insertion reaches: none is in a triangle in the end, nor in another."""
+    np.save(tmp_path / "field.npy", np.random.default_rng(1).random((9, 9)))
+    field = {"shape": {"kind": "heightfield", "file": tmp_path / "field.npy", "size": (2, 2, 0.4)}}
+    crowd = {"shape": "sphere", "count": 650, "size": 0.2}
+    sim = ps.Simulation(among(crowd, obstacles=[field], size=(2, 2, 2), boundary="wall"))
+    assert len(sim.particles.mass) == 650
+    assert sim.largest_overlap() < 1e-12
+
+
 # ---- what is wrong with them -----------------------------------------------------------------------------------------
 
 
