@@ -262,7 +262,7 @@ def test_scene_files_show_all_their_particles(path, aspect):
     box = subject_box(loaded, simulation.header, start)
     for time in (0.0, loaded.duration):
         place, away = project(view_at(loaded, time, aspect, box), aspect, start.position)
-        assert np.abs(place).max() < 1.0 and np.all(away > 0.0)
+        assert np.all(np.abs(place) < 1.0) and np.all(away > 0.0)
 
 
 def test_light_comes_over_the_left_shoulder():
