@@ -1,0 +1,71 @@
+"""What many spheres do together: what the floor of a silo bears."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from particlesim.simulation.simulation import Simulation
+from tests.worlds import scene
+
+GRAVITY = (0.0, 0.0, -9.81)
+
+# ---- silos ---------------------------------------------------------------------------------------------------------
+
+# A silo [m]: the mean diameter of its spheres, and how wide it is.
+GRAIN, WIDTH = 0.1, 0.4
+
+# When its floor begins to go down [s], and how fast [m/s]: the walls then hold what they can, as Janssen assumed.
+SETTLED, SINKING = 1.0, 0.05
+
+
+def silo(count):
+    """Spheres in a square silo with rough walls, on a floor that sinks slowly from ``SETTLED`` on."""
+    half, height = 0.5 * WIDTH, GRAIN * (4.0 + 0.0935 * count)
+    floor = -0.5 * height + GRAIN
+    region = {"lower": [-half, -half, floor], "upper": [half, half, 0.5 * height]}
+    grains = {
+        "shape": "sphere",
+        "count": count,
+        "size": {"kind": "uniform", "low": 0.9 * GRAIN, "high": 1.1 * GRAIN},
+        "placement": {"kind": "random", "region": region},
+    }
+    slab = {
+        "shape": {"kind": "box", "edges": [WIDTH, WIDTH, GRAIN]},
+        "position": [0.0, 0.0, floor - 0.5 * GRAIN],
+        "motion": {"kind": "translate", "velocity": [0.0, 0.0, -SINKING], "from": SETTLED},
+    }
+    return scene(grains, size=(WIDTH, WIDTH, height), gravity=GRAVITY, restitution=0.0, friction=0.5, obstacles=[slab])
+
+
+def borne(count, duration=0.75):
+    """What floor and walls bear, as parts of the weight, the weight [N], and how high the spheres stand [m]."""
+    sim = Simulation(silo(count))
+    sim.run(duration=SETTLED + 0.25)
+    before = sim.ledger
+    sim.run(duration=duration)
+    after = sim.ledger
+    weight = -GRAVITY[2] * sim.particles.mass.sum()
+    floor = -(after.work - before.work) / (SINKING * duration * weight)  # its work is the force times the way
+    walls = -(after.wall_shear - before.wall_shear)[:4, 2].sum() / (duration * weight)
+    return floor, walls, weight, np.ptp(sim.particles.position[:, 2]) + GRAIN
+
+
+def of_the_weight(depth):
+    """The part of its weight that the floor of a silo bears; ``depth`` in lengths width / (4 K mu).
+
+    H. A. Janssen, Z. Ver. Dtsch. Ing. 39 (1895) 1045; M. Sperl, Granular Matter 8 (2006) 59 has it in English.
+    """
+    return (1.0 - np.exp(-depth)) / depth
+
+
+def test_the_load_on_the_floor_of_a_silo_follows_janssens_law():
+    """One length is fitted, to the highest filling; half and a quarter of it then bear what the law says."""
+    found = [borne(count) for count in (75, 150, 300)]
+    for floor, walls, _, _ in found:
+        assert floor + walls == pytest.approx(1.0, abs=0.03)
+    part, _, weight, height = found[-1]
+    depth = brentq(lambda d: of_the_weight(d) - part, 0.1, 50.0)
+    for floor, _, _, h in found[:-1]:  # found: 9 % and 0.4 % off
+        assert floor == pytest.approx(of_the_weight(depth * h / height), rel=0.15)
+    # Twice as much in the silo is hardly more on its floor.
+    assert part * weight < 1.35 * found[1][0] * found[1][2]
