@@ -1,4 +1,4 @@
-"""What many spheres do together: what the floor of a silo bears."""
+"""What many spheres do together: what a silo's floor bears, and how steep a heap is."""
 
 import numpy as np
 import pytest
@@ -69,3 +69,49 @@ def test_the_load_on_the_floor_of_a_silo_follows_janssens_law():
         assert floor == pytest.approx(of_the_weight(depth * h / height), rel=0.15)
     # Twice as much in the silo is hardly more on its floor.
     assert part * weight < 1.35 * found[1][0] * found[1][2]
+
+
+# ---- heaps ---------------------------------------------------------------------------------------------------------
+
+# The mean diameter [m] of the spheres of a heap.
+PEBBLE = 0.02
+
+
+def column(friction, rolling):
+    """300 spheres in a column on a plate, which nothing holds; ``rolling`` is the rolling friction in diameters."""
+    region = {"lower": [-3.0 * PEBBLE, -3.0 * PEBBLE, -0.5], "upper": [3.0 * PEBBLE, 3.0 * PEBBLE, -0.275]}
+    pebbles = {
+        "shape": "sphere",
+        "count": 300,
+        "size": {"kind": "uniform", "low": 0.9 * PEBBLE, "high": 1.1 * PEBBLE},
+        "placement": {"kind": "random", "region": region},
+    }
+    return scene(
+        pebbles,
+        size=(2.0, 2.0, 1.0),
+        boundary=("open", "open", "wall"),
+        gravity=GRAVITY,
+        restitution=0.0,
+        friction=friction,
+        rolling_friction=rolling * PEBBLE,
+    )
+
+
+def angle_of_repose(friction, rolling):
+    """The angle [degrees] of the cone that a column leaves, 0 of a single layer.
+
+    Of a cone the middle is a quarter of its height up, and half of it is within half its radius.
+    """
+    sim = Simulation(column(friction, rolling))
+    sim.run(duration=1.0)
+    position = sim.particles.position
+    out = np.linalg.norm(position[:, :2] - np.median(position[:, :2], axis=0), axis=1)
+    up = position[:, 2] + 0.5 - 0.5 * PEBBLE
+    return np.degrees(np.arctan(4.0 * up.mean() / (2.0 * np.median(out))))
+
+
+def test_heaps_are_the_steeper_the_more_friction_and_rolling_friction_there_is():
+    """As Y. C. Zhou et al., Physica A 269 (1999) 536, have it of sandpiles of spheres."""
+    angles = np.array([[angle_of_repose(mu, rolling) for mu in (0.15, 0.3, 0.6)] for rolling in (0.05, 0.1)])
+    assert (np.diff(angles, axis=1) > 1.0).all()
+    assert (np.diff(angles, axis=0)[0, 1:] > 1.0).all()  # with little friction all of them slide away
