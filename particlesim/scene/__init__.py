@@ -32,20 +32,26 @@ class Scene(Model):
     SceneError, in one line, if it is wrong. Paths start at the current folder.
     """
 
-    title: Text = ""
-    seed: Annotated[int, Field(ge=0, le=2**63 - 1), whole, must_be("a whole number from 0 to 2^63 - 1")] = 0
-    duration: Annotated[PlainFloat, Field(gt=0, le=1e9), must_be("a number of seconds above 0, up to 1e9")] = 10.0
-    world: World
-    particles: list[Group] = Field(default_factory=list)
-    emitters: list[Emitter] = Field(default_factory=list)
-    sinks: list[Sink] = Field(default_factory=list)
-    obstacles: list[Obstacle] = Field(default_factory=list)
-    fields: list[ForceField] = Field(default_factory=list)
-    contact: list[Contact] = Field(default_factory=list)
-    solver: Solver = Field(default_factory=Solver)
-    movie: Movie = Field(default_factory=Movie)
-    camera: Camera = Field(default_factory=lambda: FixedCamera(kind="fixed"))
-    show: Show = Field(default_factory=Show)
+    title: Text = Field(default="", description="over the opening of the movie")
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1), whole, must_be("a whole number from 0 to 2^63 - 1")] = Field(
+        default=0, description="of all that is random"
+    )
+    duration: Annotated[PlainFloat, Field(gt=0, le=1e9), must_be("a number of seconds above 0, up to 1e9")] = Field(
+        default=10.0, description="how long it goes on [s]"
+    )
+    world: World = Field(description="the space that particles move in")
+    particles: list[Group] = Field(default_factory=list, description="groups of particles")
+    emitters: list[Emitter] = Field(default_factory=list, description="where particles come from while it goes on")
+    sinks: list[Sink] = Field(default_factory=list, description="where they leave")
+    obstacles: list[Obstacle] = Field(default_factory=list, description="bodies that nothing can push")
+    fields: list[ForceField] = Field(default_factory=list, description="forces on particles")
+    contact: list[Contact] = Field(
+        default_factory=list, description="what two groups do to each other, in place of what they usually do"
+    )
+    solver: Solver = Field(default_factory=Solver, description="how the motion is computed")
+    movie: Movie = Field(default_factory=Movie, description="the file that comes out")
+    camera: Camera = Field(default_factory=lambda: FixedCamera(kind="fixed"), description="where it is seen from")
+    show: Show = Field(default_factory=Show, description="what is drawn besides particles")
 
     def __init__(self, /, **table: Any) -> None:
         try:

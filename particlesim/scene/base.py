@@ -90,7 +90,10 @@ class Model(BaseModel):
 
 
 # 'from' is a word of Python, which no class can have for a field.
-_SPAN: dict[str, Any] = {"from": (NotNegative, 0.0), "until": (Positive | None, None)}
+_SPAN: dict[str, Any] = {
+    "from": (NotNegative, Field(default=0.0, description="when it begins [s]")),
+    "until": (Positive | None, Field(default=None, description="when it ends; never if not given [s]")),
+}
 
 
 class Timed(create_model("Span", __base__=Model, **_SPAN)):  # type: ignore[misc]

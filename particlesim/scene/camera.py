@@ -36,12 +36,14 @@ Subject = Annotated[Literal["auto", "world", "particles"], one_of("auto", "world
 class _Aimed(Model):
     """A camera in a given direction, as near as shows all of its subject, unless its distance is given."""
 
-    azimuth: Finite = 30.0  # [degrees] about z, from +x
-    elevation: Elevation = 20.0  # [degrees] above the horizon
-    field_of_view: FieldOfView = 40.0  # [degrees], vertical
-    subject: Subject = "auto"
-    zoom: Positive = 1.0  # how much larger than fitting
-    distance: Positive | None = None  # [m]
+    azimuth: Finite = Field(default=30.0, description="direction that it stands in, about z from +x [degrees]")
+    elevation: Elevation = Field(default=20.0, description="angle above the horizon [degrees]")
+    field_of_view: FieldOfView = Field(default=40.0, description="vertical angle of view [degrees]")
+    subject: Subject = Field(
+        default="auto", description="what is fitted into the picture; auto: the world, along open axes the particles"
+    )
+    zoom: Positive = Field(default=1.0, description="how much larger than fitting")
+    distance: Positive | None = Field(default=None, description="distance from its target, in place of a zoom [m]")
 
     @model_validator(mode="after")
     def _either(self) -> Self:
@@ -59,9 +61,9 @@ class FixedCamera(_Aimed):
 class _Placed(Model):
     """A camera at ``position`` that looks at ``target`` [m]."""
 
-    position: Vector
-    target: Vector = (0.0, 0.0, 0.0)
-    field_of_view: FieldOfView = 40.0  # [degrees], vertical
+    position: Vector = Field(description="where it stands [m]")
+    target: Vector = Field(default=(0.0, 0.0, 0.0), description="what it looks at [m]")
+    field_of_view: FieldOfView = Field(default=40.0, description="vertical angle of view [degrees]")
 
     @model_validator(mode="after")
     def _apart(self) -> Self:
@@ -86,23 +88,29 @@ class OrbitCamera(_Aimed):
     """Circles the target once in ``period`` seconds, starting at the azimuth."""
 
     kind: Literal["orbit"]
-    period: Annotated[Number, AfterValidator(_not_zero), must_be("a number of seconds, not 0")] = (
-        20.0  # [s]; negative turns the other way
+    period: Annotated[Number, AfterValidator(_not_zero), must_be("a number of seconds, not 0")] = Field(
+        default=20.0, description="of one turn; negative turns the other way [s]"
     )
-    target: Vector | None = None  # [m]; the middle of its subject if not given
+    target: Vector | None = Field(
+        default=None, description="what it circles; the middle of its subject if not given [m]"
+    )
 
 
 class CameraKey(_Placed):
     """Where a camera is at one time."""
 
-    time: Annotated[NotNegative, must_be("a number of seconds of 0 or more")]  # [s]
+    time: Annotated[NotNegative, must_be("a number of seconds of 0 or more")] = Field(
+        description="when it is there [s]"
+    )
 
 
 class PathCamera(Model):
     """Moves smoothly from key to key, at rest before the first and after the last."""
 
     kind: Literal["path"]
-    keys: Annotated[list[CameraKey], Field(min_length=1), AfterValidator(in_time)]
+    keys: Annotated[list[CameraKey], Field(min_length=1), AfterValidator(in_time)] = Field(
+        description="where it is, in the order of time"
+    )
 
 
 _Cameras = Annotated[FixedCamera | LookAtCamera | OrbitCamera | PathCamera, Field(discriminator="kind")]
@@ -149,16 +157,25 @@ _SIZES: dict[str, tuple[int, int]] = {"draft": (640, 360), "normal": (1280, 720)
 class Movie(Model):
     """The file that comes out."""
 
-    fps: Annotated[PlainFloat, Field(ge=1, le=240), must_be("a number of frames a second from 1 to 240")] = 30.0
-    speed: Annotated[PositiveNumber, must_be("a number of seconds above 0")] = 1.0  # of the scene, in one of the movie
-    quality: Quality = "normal"
-    resolution: Resolution | None = None  # [width, height] in pixels; by the quality if not given
-    background: Colour = "#f4f2ee"
-    crf: Annotated[int, Field(ge=0, le=51), whole, must_be("a whole number from 0 (lossless) to 51 (smallest)")] = (
-        18  # x264's constant rate factor: 6 more halve the file
+    fps: Annotated[PlainFloat, Field(ge=1, le=240), must_be("a number of frames a second from 1 to 240")] = Field(
+        default=30.0, description="frames a second [1/s]"
     )
-
-    fade: Annotated[NotNegative, must_be("a number of seconds of 0 or more")] = 0.0  # [s] at the start and at the end
+    speed: Annotated[PositiveNumber, must_be("a number of seconds above 0")] = Field(
+        default=1.0, description="seconds of the scene in one of the movie: 0.1 is slow motion"
+    )
+    quality: Quality = Field(
+        default="normal", description="draft is 640 x 360, normal 1280 x 720, high 1920 x 1080 with smoother edges"
+    )
+    resolution: Resolution | None = Field(
+        default=None, description="[width, height], even; by the quality if not given [pixels]"
+    )
+    background: Colour = Field(default="#f4f2ee", description="a colour name or '#rrggbb', behind all")
+    crf: Annotated[int, Field(ge=0, le=51), whole, must_be("a whole number from 0 (lossless) to 51 (smallest)")] = (
+        Field(default=18, description="constant rate factor of x264, from lossless to smallest: 6 more halve the file")
+    )
+    fade: Annotated[NotNegative, must_be("a number of seconds of 0 or more")] = Field(
+        default=0.0, description="from the background at the start and to it at the end [s]"
+    )
 
     @property
     def size(self) -> tuple[int, int]:
@@ -192,16 +209,18 @@ def _readout(value: Any) -> Any:
 class Show(Model):
     """What is drawn besides the particles."""
 
-    box: Flag | None = None  # edges of the world; if not given, unless all axes are open
-    cells: Flag = False  # leaves of the octree
-    plot: Annotated[Literal["energy", "momentum", "impacts"], one_of("energy", "momentum", "impacts")] | None = (
-        None  # curves over the time, which grow with the movie
+    box: Flag | None = Field(default=None, description="edges of the world; if not given, unless all axes are open")
+    cells: Flag = Field(default=False, description="leaves of the octree")
+    plot: Annotated[Literal["energy", "momentum", "impacts"], one_of("energy", "momentum", "impacts")] | None = Field(
+        default=None, description="curves over the time, which grow with the movie"
     )
-    title: Flag = True  # over the opening of the movie, where the scene has one
-    readout: Annotated[bool | list[str], BeforeValidator(_readout, json_schema_input_type=bool | list[_Row])] = (
-        True  # which rows; true stands for time, particles, impacts and energy change
+    title: Flag = Field(default=True, description="the scene's title over the opening of the movie, where it has one")
+    readout: Annotated[bool | list[str], BeforeValidator(_readout, json_schema_input_type=bool | list[_Row])] = Field(
+        default=True, description="which rows; true stands for time, particles, impacts and energy change"
     )
-    legend: Flag | None = None  # scales of fields and names of colours; the scales alone if not given
+    legend: Flag | None = Field(
+        default=None, description="scales of fields and names of colours; the scales alone if not given"
+    )
 
     @property
     def rows(self) -> tuple[str, ...]:

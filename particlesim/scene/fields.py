@@ -13,14 +13,14 @@ from particlesim.scene.placements import Region, not_zero
 class _InRegion(Model):
     """A field in a region, everywhere if none is given."""
 
-    region: Region | None = None
+    region: Region | None = Field(default=None, description="where it acts; everywhere if not given")
 
 
 class UniformField(_InRegion):
     """The same acceleration everywhere [m/s^2]."""
 
     kind: Literal["uniform"]
-    acceleration: Vector
+    acceleration: Vector = Field(description="of every particle [m/s^2]")
 
 
 class CentralField(_InRegion):
@@ -30,27 +30,29 @@ class CentralField(_InRegion):
     """
 
     kind: Literal["central"]
-    centre: Vector = (0.0, 0.0, 0.0)
-    strength: Finite
-    exponent: Finite = -2.0
-    softening: NotNegative = 0.0
+    centre: Vector = Field(default=(0.0, 0.0, 0.0), description="where it pulls to [m]")
+    strength: Finite = Field(description="acceleration at 1 m; negative pushes away [m/s^2]")
+    exponent: Finite = Field(default=-2.0, description="of the distance")
+    softening: NotNegative = Field(default=0.0, description="length that keeps it finite at the centre [m]")
 
 
 class VortexField(_InRegion):
     """An acceleration round an axis through the centre, ``strength`` [1/s^2] times the distance from it."""
 
     kind: Literal["vortex"]
-    centre: Vector = (0.0, 0.0, 0.0)
-    axis: Annotated[Vector, AfterValidator(not_zero)] = (0.0, 0.0, 1.0)
-    strength: Finite
+    centre: Vector = Field(default=(0.0, 0.0, 0.0), description="a point of the axis [m]")
+    axis: Annotated[Vector, AfterValidator(not_zero)] = Field(
+        default=(0.0, 0.0, 1.0), description="direction of the axis"
+    )
+    strength: Finite = Field(description="acceleration for each metre from the axis [1/s^2]")
 
 
 class DragField(_InRegion):
     """A force against the velocity through a medium, ``coefficient`` [kg/s] times it."""
 
     kind: Literal["drag"]
-    coefficient: Positive
-    velocity: Vector = (0.0, 0.0, 0.0)  # of the medium [m/s]
+    coefficient: Positive = Field(description="force for each m/s [kg/s]")
+    velocity: Vector = Field(default=(0.0, 0.0, 0.0), description="of the medium [m/s]")
 
 
 ForceField = Annotated[UniformField | CentralField | VortexField | DragField, Field(discriminator="kind")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from particlesim.scene.base import Model, Positive, Text, Timed
 from particlesim.scene.groups import Group, RadialVelocity
@@ -15,8 +15,8 @@ class Emitter(Group, Timed):
     None is put into another body: what finds no room waits for it.
     """
 
-    rate: Positive  # [1/s]
-    region: Region
+    rate: Positive = Field(description="how many come in a second [1/s]")
+    region: Region = Field(description="where they come")
 
     @model_validator(mode="after")
     def _is_no_start(self) -> Emitter:
@@ -30,5 +30,5 @@ class Emitter(Group, Timed):
 class Sink(Model):
     """A region whose particles are taken out: those whose centroid is in it when a time step ends."""
 
-    name: Text | None = None
-    region: Region
+    name: Text | None = Field(default=None, description="for messages")
+    region: Region = Field(description="where they are taken out")

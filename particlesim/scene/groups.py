@@ -50,50 +50,50 @@ class CapsuleShape(Model):
     """
 
     kind: Literal["capsule"]
-    length: Positive
+    length: Positive = Field(description="distance of the centres of its half spheres, times the size [m]")
 
 
-# A rounded polyhedron is all points within this distance of it, times the size: a cube with rounding 0.1 is 1.2 wide.
 Rounding = NotNegative
+_ROUNDING = "all within this distance of it belong to it, times the size: a cube with 0.1 is 1.2 wide [m]"
 
 
 class PolyhedronShape(Model):
     """A polyhedron of edge 1, times the size."""
 
     kind: _PolyhedronName
-    rounding: Rounding = 0.0
+    rounding: Rounding = Field(default=0.0, description=_ROUNDING)
 
 
 class CylinderShape(Model):
     """A cylinder of diameter 1 and the given length, along z, times the size; a prism of 64 sides."""
 
     kind: Literal["cylinder"]
-    length: Positive = 1.0
-    rounding: Rounding = 0.0
+    length: Positive = Field(default=1.0, description="along z, times the size [m]")
+    rounding: Rounding = Field(default=0.0, description=_ROUNDING)
 
 
 class ConeShape(Model):
     """A cone on a base of diameter 1 and with the given height, along z, times the size; of 64 sides."""
 
     kind: Literal["cone"]
-    height: Positive = 1.0
-    rounding: Rounding = 0.0
+    height: Positive = Field(default=1.0, description="along z, times the size [m]")
+    rounding: Rounding = Field(default=0.0, description=_ROUNDING)
 
 
 class BoxShape(Model):
     """A box with the given edges, times the size."""
 
     kind: Literal["box"]
-    edges: PositiveVector
-    rounding: Rounding = 0.0
+    edges: PositiveVector = Field(description="along x, y and z, times the size [m]")
+    rounding: Rounding = Field(default=0.0, description=_ROUNDING)
 
 
 class PyramidShape(Model):
     """A pyramid on a square base of edge 1 and with the given height, times the size."""
 
     kind: Literal["pyramid"]
-    height: Positive = 1.0
-    rounding: Rounding = 0.0
+    height: Positive = Field(default=1.0, description="along z, times the size [m]")
+    rounding: Rounding = Field(default=0.0, description=_ROUNDING)
 
 
 # What the numbers of a mesh file are in, which the file does not say.
@@ -105,9 +105,9 @@ class MeshShape(Model):
     """The convex hull of an STL, OBJ or PLY file, times the size. Paths start at the scene file's folder."""
 
     kind: Literal["mesh"]
-    file: Annotated[File, AfterValidator(mesh_file)]
-    unit: Unit = "m"
-    rounding: Rounding = 0.0
+    file: Annotated[File, AfterValidator(mesh_file)] = Field(description="path from the scene's folder")
+    unit: Unit = Field(default="m", description="of the numbers in the file")
+    rounding: Rounding = Field(default=0.0, description=_ROUNDING)
 
 
 Solids = SphereShape | CapsuleShape | CylinderShape | ConeShape | PolyhedronShape | BoxShape | PyramidShape
@@ -126,15 +126,15 @@ class FixedSize(Model):
     """Every particle has this size."""
 
     kind: Literal["fixed"]
-    value: Positive
+    value: Positive = Field(description="factor on the shape")
 
 
 class RangeSize(Model):
     """Sizes between low and high, evenly spread (``uniform``) or evenly spread in their logarithm."""
 
     kind: Literal["uniform", "log-uniform"]
-    low: Positive
-    high: Positive
+    low: Positive = Field(description="smallest")
+    high: Positive = Field(description="largest")
 
     @model_validator(mode="after")
     def _ordered(self) -> RangeSize:
@@ -166,45 +166,45 @@ class Maxwell(Model):
     """The Maxwell-Boltzmann distribution at ``temperature`` [J, so that Boltzmann's constant is 1], plus drift."""
 
     kind: Literal["maxwell"]
-    temperature: NotNegative
-    drift: Vector = (0.0, 0.0, 0.0)
+    temperature: NotNegative = Field(description="Boltzmann's constant is 1 [J]")
+    drift: Vector = Field(default=(0.0, 0.0, 0.0), description="added to all [m/s]")
 
 
 class UniformSpeed(Model):
     """The same speed [m/s] in directions drawn evenly, plus drift."""
 
     kind: Literal["uniform"]
-    speed: NotNegative
-    drift: Vector = (0.0, 0.0, 0.0)
+    speed: NotNegative = Field(description="of all [m/s]")
+    drift: Vector = Field(default=(0.0, 0.0, 0.0), description="added to all [m/s]")
 
 
 class FixedVelocity(Model):
     """The same velocity [m/s] for all."""
 
     kind: Literal["fixed"]
-    vector: Vector
+    vector: Vector = Field(description="of all: a velocity [m/s] or a spin [rad/s]")
 
 
 class RadialVelocity(Model):
     """Away from the centre or towards it at ``speed`` [m/s]."""
 
     kind: Literal["outward", "inward"]
-    speed: NotNegative
-    centre: Vector = (0.0, 0.0, 0.0)
+    speed: NotNegative = Field(description="of all [m/s]")
+    centre: Vector = Field(default=(0.0, 0.0, 0.0), description="where from or to [m]")
 
 
 class SpinMaxwell(Model):
     """Angular momenta of thermal equilibrium at ``temperature`` [J]."""
 
     kind: Literal["maxwell"]
-    temperature: NotNegative
+    temperature: NotNegative = Field(description="Boltzmann's constant is 1 [J]")
 
 
 class SpinUniform(Model):
     """The same angular speed [rad/s] about axes drawn evenly."""
 
     kind: Literal["uniform"]
-    speed: NotNegative
+    speed: NotNegative = Field(description="of all [rad/s]")
 
 
 _VECTOR_OR_TABLE = 'a list of 3 numbers, [x, y, z], or a table such as { kind = "maxwell", temperature = 1 }'
@@ -224,6 +224,7 @@ Spin = Annotated[_Spins, _or_vector(_Spins)]
 
 # Colours that stand for a quantity.
 FIELDS = "by_speed", "by_height", "by_size", "by_impacts"
+_COLOURED = "by_shape", "by_group", *FIELDS
 
 
 def _rising(value: tuple[float, float]) -> tuple[float, float]:
@@ -241,20 +242,24 @@ class Group(Surface):
     The world says how the surface is where the group does not; a pair takes the smaller of its two values.
     """
 
-    name: Text | None = None
-    shape: AnyShape
+    name: Text | None = Field(default=None, description="for contacts, legends and messages")
+    shape: AnyShape = Field(description="of all of them, at size 1")
     count: (
         Annotated[int, Field(ge=0, le=MAX_COUNT), whole, must_be(f"a whole number from 0 to {MAX_COUNT:,}")] | None
-    ) = None
-    size: Size = Field(default_factory=lambda: FixedSize(kind="fixed", value=1.0))
-    density: Positive | None = None  # [kg/m^3]; 1000 if neither it nor the mass is given
-    mass: Positive | None = None  # [kg]
-    placement: Placement = Field(default_factory=lambda: RandomPlacement(kind="random"))
-    orientation: AnyOrientation = "random"
-    velocity: Velocity = Field(default_factory=lambda: Rest(kind="rest"))
-    spin: Spin = Field(default_factory=lambda: Rest(kind="rest"))
-    colour: Annotated[Text, colour_or("by_shape", "by_group", *FIELDS)] = "by_shape"
-    colour_range: Range | None = None  # of the field's scale; settled by the run if not given
+    ) = Field(default=None, description="how many; of a list of poses as many as it has")
+    size: Size = Field(default_factory=lambda: FixedSize(kind="fixed", value=1.0), description="factor on the shape")
+    density: Positive | None = Field(default=None, description="1000 if neither it nor the mass is given [kg/m^3]")
+    mass: Positive | None = Field(default=None, description="of each, in place of a density [kg]")
+    placement: Placement = Field(default_factory=lambda: RandomPlacement(kind="random"), description="where they start")
+    orientation: AnyOrientation = Field(default="random", description="how they are turned at first")
+    velocity: Velocity = Field(default_factory=lambda: Rest(kind="rest"), description="how they move at first [m/s]")
+    spin: Spin = Field(default_factory=lambda: Rest(kind="rest"), description="how they turn at first [rad/s]")
+    colour: Annotated[Text, colour_or(*_COLOURED)] = Field(
+        default="by_shape", description=f"a colour name, '#rrggbb', or {listed(_COLOURED)}"
+    )
+    colour_range: Range | None = Field(
+        default=None, description="ends of the scale of by_speed and the like; settled by the run if not given"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> Group:

@@ -35,7 +35,7 @@ class PlaneShape(Model):
     """All that is behind a plane through the position, without end; the normal points out of it."""
 
     kind: Literal["plane"]
-    normal: Direction = (0.0, 0.0, 1.0)
+    normal: Direction = Field(default=(0.0, 0.0, 1.0), description="points out of it")
 
 
 class SurfaceShape(Model):
@@ -45,20 +45,23 @@ class SurfaceShape(Model):
     """
 
     kind: Literal["mesh"]
-    file: Annotated[File, AfterValidator(mesh_file), AfterValidator(file_within)]
-    unit: Unit = "m"
-    scale: Positive = 1.0
+    file: Annotated[File, AfterValidator(mesh_file), AfterValidator(file_within)] = Field(
+        description="path within the scene's folder"
+    )
+    unit: Unit = Field(default="m", description="of the numbers in the file")
+    scale: Positive = Field(default=1.0, description="factor on the numbers in the file")
 
 
 class HeightfieldShape(Model):
-    """Heights on a grid, from a numpy array (.npy) or a picture (.png, black is 0 and white is 1), about its middle.
-
-    ``size`` is how far it goes along x (columns) and y (rows, the first at the far end), and the height of 1 [m].
-    """
+    """Heights on a grid, from a numpy array (.npy) or a picture (.png, black is 0 and white is 1), about its middle."""
 
     kind: Literal["heightfield"]
-    file: Annotated[File, AfterValidator(existing_file), AfterValidator(file_within)]
-    size: PositiveVector
+    file: Annotated[File, AfterValidator(existing_file), AfterValidator(file_within)] = Field(
+        description="path within the scene's folder"
+    )
+    size: PositiveVector = Field(
+        description="how far it goes along x (columns) and y (rows, the first at the far end), and the height of 1 [m]"
+    )
 
 
 Surfaces = SurfaceShape | HeightfieldShape
@@ -77,34 +80,38 @@ class SpinMotion(Timed):
     """Turns about an axis through ``centre`` (the obstacle's position if not given) at ``rate`` [rad/s]."""
 
     kind: Literal["spin"]
-    axis: Direction = (0.0, 0.0, 1.0)
-    rate: Finite
-    centre: Vector | None = None  # [m]
+    axis: Direction = Field(default=(0.0, 0.0, 1.0), description="that it turns about")
+    rate: Finite = Field(description="angular speed [rad/s]")
+    centre: Vector | None = Field(
+        default=None, description="a point of the axis; the obstacle's position if not given [m]"
+    )
 
 
 class VibrateMotion(Timed):
     """Swings by ``amplitude`` [m] to both sides along ``direction``, ``frequency`` times a second."""
 
     kind: Literal["vibrate"]
-    direction: Direction = (0.0, 0.0, 1.0)
-    amplitude: NotNegative
-    frequency: Positive  # [Hz]
-    phase: Finite = 0.0  # when it begins [degrees]: at 0 in the middle, going ahead
+    direction: Direction = Field(default=(0.0, 0.0, 1.0), description="that it swings along")
+    amplitude: NotNegative = Field(description="to both sides [m]")
+    frequency: Positive = Field(description="swings a second [Hz]")
+    phase: Finite = Field(default=0.0, description="that it begins with: at 0 in the middle, going ahead [degrees]")
 
 
 class TranslateMotion(Timed):
     """Goes on at ``velocity`` [m/s]."""
 
     kind: Literal["translate"]
-    velocity: Vector
+    velocity: Vector = Field(description="that it goes on at [m/s]")
 
 
 class MotionKey(Model):
     """Where an obstacle is at one time."""
 
-    time: NotNegative  # [s]
-    position: Vector | None = None  # [m]; as at the key before if not given, and at first that of the obstacle
-    orientation: Orientation | None = None  # likewise
+    time: NotNegative = Field(description="when it is there [s]")
+    position: Vector | None = Field(
+        default=None, description="where; as at the key before if not given, and at first as the obstacle says [m]"
+    )
+    orientation: Orientation | None = Field(default=None, description="how it is turned; likewise")
 
 
 class KeysMotion(Model):
@@ -114,7 +121,9 @@ class KeysMotion(Model):
     """
 
     kind: Literal["keys"]
-    keys: Annotated[list[MotionKey], Field(min_length=1), AfterValidator(in_time)]
+    keys: Annotated[list[MotionKey], Field(min_length=1), AfterValidator(in_time)] = Field(
+        description="where it is, in the order of time"
+    )
 
 
 Motion = Annotated[SpinMotion | VibrateMotion | TranslateMotion | KeysMotion, Field(discriminator="kind")]
@@ -126,12 +135,16 @@ class Obstacle(Surface):
     Like a group's, its surface is as the world says where it does not.
     """
 
-    name: Text | None = None
-    shape: ObstacleShape
-    size: Positive = 1.0  # factor on the shape
-    position: Vector = (0.0, 0.0, 0.0)  # of its centroid, a point of the plane, or the origin of a mesh [m]
-    orientation: Orientation = (1.0, 0.0, 0.0, 0.0)
-    colour: Colour = "#8899aa"
-    opacity: Fraction = 1.0  # 0 is not drawn
-    motion: Motion | None = None
-    surface_velocity: Vector | None = None  # of a conveyor, world axes, felt by friction [m/s]
+    name: Text | None = Field(default=None, description="for contacts and messages")
+    shape: ObstacleShape = Field(description="at size 1")
+    size: Positive = Field(default=1.0, description="factor on the shape")
+    position: Vector = Field(
+        default=(0.0, 0.0, 0.0), description="of its centroid, a point of the plane, or the origin of a mesh [m]"
+    )
+    orientation: Orientation = Field(default=(1.0, 0.0, 0.0, 0.0), description="how it is turned at first")
+    colour: Colour = Field(default="#8899aa", description="a colour name or '#rrggbb'")
+    opacity: Fraction = Field(default=1.0, description="0 is not drawn")
+    motion: Motion | None = Field(default=None, description="stands still if not given")
+    surface_velocity: Vector | None = Field(
+        default=None, description="of a conveyor, along world axes, felt through friction [m/s]"
+    )

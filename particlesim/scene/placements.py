@@ -24,9 +24,11 @@ from particlesim.scene.messages import hint, must_be, one_of
 class Region(Model):
     """A part of the world, from one corner to the opposite one [m]: that box, or the ellipsoid that just fits in."""
 
-    lower: Vector
-    upper: Vector
-    form: Annotated[Literal["box", "ellipsoid"], one_of("box", "ellipsoid")] = "box"
+    lower: Vector = Field(description="corner with the smallest coordinates [m]")
+    upper: Vector = Field(description="corner with the largest [m]")
+    form: Annotated[Literal["box", "ellipsoid"], one_of("box", "ellipsoid")] = Field(
+        default="box", description="the box, or the ellipsoid that just fits in"
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Region:
@@ -39,16 +41,16 @@ class RandomPlacement(Model):
     """Anywhere in the region (the whole world if not given) without overlap."""
 
     kind: Literal["random"]
-    region: Region | None = None
+    region: Region | None = Field(default=None, description="the whole world if not given")
 
 
 class LatticePlacement(Model):
     """On a simple cubic lattice centred in the region; jitter moves particles by that fraction of the free gap."""
 
     kind: Literal["lattice"]
-    spacing: Positive | None = None  # [m]; the widest that holds the count if not given
-    jitter: Fraction = 0.0
-    region: Region | None = None
+    spacing: Positive | None = Field(default=None, description="the widest that holds the count if not given [m]")
+    jitter: Fraction = Field(default=0.0, description="how far each is moved, as a fraction of the free gap")
+    region: Region | None = Field(default=None, description="the whole world if not given")
 
 
 def _leads_on(points: list[Any]) -> list[Any]:
@@ -67,17 +69,21 @@ class RowPlacement(Model):
     """
 
     kind: Literal["row"]
-    through: Annotated[list[Vector], AfterValidator(_leads_on)]
+    through: Annotated[list[Vector], AfterValidator(_leads_on)] = Field(description="points of the curve [m]")
 
 
 class ClusterPlacement(Model):
     """In Gaussian blobs of standard deviation ``spread`` [m] about given or random centres, without overlap."""
 
     kind: Literal["cluster"]
-    clusters: Annotated[int, Field(ge=1, le=MAX_COUNT), whole, must_be("a whole number of 1 or more")] | None = None
-    spread: Positive
-    centres: Annotated[list[Vector], Field(min_length=1)] | None = None
-    region: Region | None = None
+    clusters: Annotated[int, Field(ge=1, le=MAX_COUNT), whole, must_be("a whole number of 1 or more")] | None = Field(
+        default=None, description="how many blobs; as many as there are centres if not given"
+    )
+    spread: Positive = Field(description="standard deviation [m]")
+    centres: Annotated[list[Vector], Field(min_length=1)] | None = Field(
+        default=None, description="of the blobs; random if not given [m]"
+    )
+    region: Region | None = Field(default=None, description="the whole world if not given")
 
     @model_validator(mode="after")
     def _counted(self) -> ClusterPlacement:
@@ -95,8 +101,8 @@ def not_zero(value: tuple[float, ...]) -> tuple[float, ...]:
 class Turn(Model):
     """A rotation by ``angle`` [degrees] about ``axis``."""
 
-    axis: Annotated[Vector, AfterValidator(not_zero)]
-    angle: Finite
+    axis: Annotated[Vector, AfterValidator(not_zero)] = Field(description="that it is turned about")
+    angle: Finite = Field(description="by how much [degrees]")
 
 
 _HOW_TURNED = "[w, x, y, z] (a quaternion), or { axis = [x, y, z], angle = degrees }"
@@ -128,17 +134,17 @@ AnyOrientation = Annotated[_Given | Annotated[_Word, Tag("(word)")], Discriminat
 class Pose(Model):
     """One particle of a ``list``: velocity [m/s] and spin [rad/s] override those of its group."""
 
-    position: Vector
-    orientation: Orientation = (1.0, 0.0, 0.0, 0.0)
-    velocity: Vector | None = None
-    spin: Vector | None = None
+    position: Vector = Field(description="of the centroid [m]")
+    orientation: Orientation = Field(default=(1.0, 0.0, 0.0, 0.0), description="how it is turned")
+    velocity: Vector | None = Field(default=None, description="in place of the group's [m/s]")
+    spin: Vector | None = Field(default=None, description="in place of the group's [rad/s]")
 
 
 class ListPlacement(Model):
     """Exactly here."""
 
     kind: Literal["list"]
-    poses: Annotated[list[Pose], Field(min_length=1)]
+    poses: Annotated[list[Pose], Field(min_length=1)] = Field(description="one for each particle")
 
 
 _Placements = Annotated[

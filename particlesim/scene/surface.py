@@ -39,14 +39,20 @@ class HasSurface(Model):
 class Surface(HasSurface):
     """How a surface takes impacts and sliding; what is not given is as it would be without the table."""
 
-    restitution: Fraction | None = None
-    friction: NotNegative | None = None  # Coulomb's coefficient while the surfaces slide
-    static_friction: NotNegative | None = None  # and until they do; the friction if only that is given
-    rolling_friction: NotNegative | None = None  # [m]; the torque is at most this times the normal force
-    tangential_restitution: TangentialRestitution | None = None  # of impacts that stick, Walton's beta_0
+    restitution: Fraction | None = Field(default=None, description="part of the speed that an impact gives back")
+    friction: NotNegative | None = Field(default=None, description="Coulomb's coefficient while surfaces slide")
+    static_friction: NotNegative | None = Field(
+        default=None, description="and until they do; the friction if only that is given"
+    )
+    rolling_friction: NotNegative | None = Field(
+        default=None, description="the torque is at most this times the normal force [m]"
+    )
+    tangential_restitution: TangentialRestitution | None = Field(
+        default=None, description="part of the sliding that impacts which stick give back, Walton's beta_0"
+    )
 
 
 class Contact(Surface):
     """What groups and obstacles, or the particles of one group, do to each other in place of what they usually do."""
 
-    between: Two
+    between: Two = Field(description="the names of two groups, of one and an obstacle or 'walls', or one twice")

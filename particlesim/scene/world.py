@@ -38,17 +38,23 @@ def _for_each_axis(value: Any) -> Any:
 class World(HasSurface):
     """A box of ``size`` [m] about the origin."""
 
-    size: PositiveVector
+    size: PositiveVector = Field(description="edges of the box, about the origin [m]")
     boundary: Annotated[
         tuple[Boundary, Boundary, Boundary],
         BeforeValidator(_for_each_axis, json_schema_input_type=Boundary | tuple[Boundary, Boundary, Boundary]),
-    ] = ("wall", "wall", "wall")
-    gravity: Vector = (0.0, 0.0, 0.0)  # [m/s^2]
-    restitution: Fraction = 1.0
-    friction: NotNegative = 0.0  # Coulomb's coefficient while surfaces slide
-    static_friction: NotNegative | None = None  # and until they do; the friction if not given
-    rolling_friction: NotNegative = 0.0  # [m]; the torque is at most this times the normal force
-    tangential_restitution: TangentialRestitution = 0.0  # of impacts that stick, Walton's beta_0
+    ] = Field(default=("wall", "wall", "wall"), description="what ends it along x, y and z, or one word for all")
+    gravity: Vector = Field(default=(0.0, 0.0, 0.0), description="acceleration of all particles [m/s^2]")
+    restitution: Fraction = Field(default=1.0, description="part of the speed that an impact gives back")
+    friction: NotNegative = Field(default=0.0, description="Coulomb's coefficient while surfaces slide")
+    static_friction: NotNegative | None = Field(
+        default=None, description="and until they do; the friction if not given"
+    )
+    rolling_friction: NotNegative = Field(
+        default=0.0, description="the torque is at most this times the normal force [m]"
+    )
+    tangential_restitution: TangentialRestitution = Field(
+        default=0.0, description="part of the sliding that impacts which stick give back, Walton's beta_0"
+    )
 
     @property
     def period(self) -> tuple[float, float, float]:
@@ -67,15 +73,21 @@ class Grid(Model):
     """A uniform grid of ``cells`` x ``cells`` x ``cells`` boxes; from number and sizes of particles if not given."""
 
     kind: Literal["grid"]
-    cells: Annotated[int, Field(ge=1, le=1024), whole, must_be("a whole number from 1 to 1024")] | None = None
+    cells: Annotated[int, Field(ge=1, le=1024), whole, must_be("a whole number from 1 to 1024")] | None = Field(
+        default=None, description="along each axis; from number and sizes of particles if not given"
+    )
 
 
 class Octree(Model):
     """Nodes split while they hold more than ``max_count`` particles, down to ``max_depth``."""
 
     kind: Literal["octree"]
-    max_count: Annotated[int, Field(ge=1, le=1_000_000), whole, must_be("a whole number from 1 to 1,000,000")] = 32
-    max_depth: Annotated[int, Field(ge=1, le=20), whole, must_be("a whole number from 1 to 20")] = 16
+    max_count: Annotated[int, Field(ge=1, le=1_000_000), whole, must_be("a whole number from 1 to 1,000,000")] = Field(
+        default=32, description="particles that a node holds undivided"
+    )
+    max_depth: Annotated[int, Field(ge=1, le=20), whole, must_be("a whole number from 1 to 20")] = Field(
+        default=16, description="levels of nodes"
+    )
 
 
 _BroadPhases = Annotated[Naive | Grid | Octree, Field(discriminator="kind")]
@@ -90,7 +102,7 @@ class Solver(Model):
             '"octree", "grid", "naive", or a table such as { kind = "grid", cells = 32 }',
             _BroadPhases | Literal["octree", "grid", "naive"],
         ),
-    ] = Field(default_factory=lambda: Octree(kind="octree"))
-    time_step: Annotated[Literal["auto"] | PositiveNumber, must_be("'auto' or a number of seconds above 0")] = (
-        "auto"  # [s]
+    ] = Field(default_factory=lambda: Octree(kind="octree"), description="how pairs that may collide are found")
+    time_step: Annotated[Literal["auto"] | PositiveNumber, must_be("'auto' or a number of seconds above 0")] = Field(
+        default="auto", description="how much is computed at once; no impact is missed, whatever it is [s]"
     )
