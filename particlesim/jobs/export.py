@@ -45,7 +45,8 @@ def export(
 
     Returns
     -------
-    What was written; beside x.pvd there is a folder x.
+    list of Path
+        What was written; beside x.pvd there is a folder x.
 
     Raises
     ------

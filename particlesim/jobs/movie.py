@@ -52,7 +52,8 @@ def simulate(
 
     Returns
     -------
-    What the run amounted to.
+    Summary
+        What the run amounted to.
 
     Raises
     ------
@@ -128,7 +129,8 @@ def render(
 
     Returns
     -------
-    What the run amounted to; in a notebook it shows the movie.
+    Summary
+        What the run amounted to; in a notebook it shows the movie.
 
     Raises
     ------
@@ -202,7 +204,8 @@ def still(
 
     Returns
     -------
-    What the run amounted to; in a notebook it shows the picture.
+    Summary
+        What the run amounted to; in a notebook it shows the picture.
 
     Raises
     ------

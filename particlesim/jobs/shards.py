@@ -83,7 +83,8 @@ def join(parts: Sequence[str | Path], path: str | Path) -> dict[str, Any]:
 
     Returns
     -------
-    Where it comes from, as ``particlesim info`` says it.
+    dict
+        Where it comes from, as ``particlesim info`` says it.
 
     Raises
     ------

@@ -53,7 +53,8 @@ def view(
 
     Returns
     -------
-    The page; in a notebook it shows itself.
+    Page
+        The page; in a notebook it shows itself.
 
     Raises
     ------

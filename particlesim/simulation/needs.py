@@ -20,8 +20,8 @@ _LEDGER, _PARTICLE, _SPIN, _IMAGE = 2400, 44, 16, 12
 # Bytes of a checkpoint for each particle; the one before goes when the next is whole.
 _CHECKPOINT = 2 * 430
 
-# Bytes a pixel of a movie at crf 18, of which x264 doubles or halves six more or less: 0.03 to 0.07 in the movies of
-# the README. The least is what a movie takes in which next to nothing moves.
+# Bytes a pixel of a movie at crf 18, of which x264 doubles or halves six more or less: 0.03 to 0.07 in the movies
+# in renders/. The least is what a movie takes in which next to nothing moves.
 _PIXEL, _LEAST = 0.04, 0.001
 
 

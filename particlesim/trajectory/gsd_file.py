@@ -175,8 +175,9 @@ class Trajectory:
 
         Returns
         -------
-        Structured array of float64 in SI units, of which ``pandas.DataFrame`` makes a frame; what is not known is not
-        a number.
+        numpy.ndarray
+            Structured, of float64 in SI units; ``pandas.DataFrame`` makes a frame of it. What is not known is not a
+            number.
 
         Raises
         ------

@@ -59,7 +59,8 @@ def sweep(
 
     Returns
     -------
-    The rows, and what was written.
+    SweepResult
+        The rows, and what was written.
 
     Raises
     ------
