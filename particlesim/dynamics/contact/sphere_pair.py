@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import add, axpy, cross, dot, norm, scale, set_vec3, sub, to_vec3
+from particlesim.core.math3d import axpy, cross, dot, norm, scale, set_vec3, sub, to_vec3
 from particlesim.dynamics.ccd.time_of_impact import sphere_half_space_impact
+from particlesim.dynamics.ccd.touch import point_velocity
 from particlesim.dynamics.contact.booking import IMPACTS, LOST, VIRIAL
 from particlesim.dynamics.contact.law import has_friction, restitution_of
 from particlesim.dynamics.events.paths import UNCHAINED, UNDISTURBED, write_segment
@@ -19,7 +20,7 @@ from particlesim.dynamics.settings import APPROACH_TOLERANCE
 from particlesim.geometry.support import half_space_plane, is_sphere
 from particlesim.model.bodies import angular_velocity_of, per_mass, placed
 from particlesim.model.domain import nearest_image
-from particlesim.model.free_motion import path_of_body, place_on_path, set_pose
+from particlesim.model.free_motion import advance_path, path_of_body, set_pose
 
 # What is left of the approach, as a fraction of it, above which the impulse was not all that was needed: rounding.
 _LEFT_APPROACH = 1e-3
@@ -60,12 +61,6 @@ def _inverse_mass_at(b, orientation, lever_arm, normal):
 
 
 @kernel
-def _point_velocity(b, orientation, lever_arm):
-    spin = angular_velocity_of(orientation, to_vec3(b.angular_momentum), to_vec3(b.principal_inertia))
-    return add(to_vec3(b.velocity), cross(spin, lever_arm))
-
-
-@kernel
 def _record(b, clock, i, time, after, segment):
     """Write the two segments of a sphere with one impact at ``time``, and its record just ``after`` it."""
     write_segment(segment[0], b, i, 0.0)
@@ -85,8 +80,9 @@ def resolve_sphere_pair(system, clock, i, j, interval, accumulator, segment):
     """
     time, end = interval
     a, b = system.body[i], system.body[j]
-    x_a, q_a, v_a = place_on_path(path_of_body(system, i), to_vec3(a.principal_inertia), time)
-    x_b, q_b, v_b = place_on_path(path_of_body(system, j), to_vec3(b.principal_inertia), time)
+    path_a = advance_path(path_of_body(system, i), to_vec3(a.principal_inertia), time)
+    path_b = advance_path(path_of_body(system, j), to_vec3(b.principal_inertia), time)
+    (x_a, q_a, v_a), (x_b, q_b, v_b) = path_a[:3], path_b[:3]
     offset = nearest_image(sub(x_b, x_a), system.domain[0].period)
     distance = norm(offset)
     if distance == 0.0 or clock[i].first_segment != UNDISTURBED or clock[j].first_segment != UNDISTURBED:
@@ -95,7 +91,7 @@ def resolve_sphere_pair(system, clock, i, j, interval, accumulator, segment):
     separation = distance - 0.5 * (a.scale + b.scale)
     arm_a = scale(normal, 0.5 * (a.scale + separation))
     arm_b = sub(arm_a, offset)
-    of_a, of_b = _point_velocity(a, q_a, arm_a), _point_velocity(b, q_b, arm_b)
+    of_a, of_b = point_velocity(a, path_a, arm_a), point_velocity(b, path_b, arm_b)
     speed = -dot(of_a, normal) + dot(of_b, normal)
     if speed >= -(APPROACH_TOLERANCE * (norm(of_a) + norm(of_b)) + system.domain[0].rest_speed):
         return False
