@@ -32,6 +32,7 @@ from particlesim.broad_phase.grid import grid_pairs
 from particlesim.broad_phase.naive import naive_pairs
 from particlesim.broad_phase.octree import octree_pairs
 from particlesim.broad_phase.octree_cells import octree_leaves
+from particlesim.core.arguments import real_numbers, shown
 
 __all__ = ["METHODS", "find_pairs", "octree_leaves"]
 
@@ -45,6 +46,9 @@ METHODS: dict[str, Callable[..., tuple[np.ndarray, int]]] = {
 # which an image is still placed to a millionth of the period.
 _FARTHEST = 1e100
 _MOST_PERIODS = 2.0**32
+
+# The largest whole number of an array.
+_MOST = 2**63 - 1
 
 
 def find_pairs(
@@ -86,8 +90,8 @@ def find_pairs(
     TypeError
         For a parameter that the method does not have, or one that is no whole number.
     """
-    if method not in METHODS:
-        raise ValueError(f"find_pairs: unknown method {method!r}, expected one of {', '.join(METHODS)}")
+    if not isinstance(method, str) or method not in METHODS:
+        raise ValueError(f"find_pairs: unknown method {shown(method)}, expected one of {', '.join(METHODS)}")
     numbers = _checked_parameters(method, {"threads": threads, **parameters})
     low, high = _checked("lower", lower), _checked("upper", upper)
     if low.shape != high.shape:
@@ -108,28 +112,22 @@ def find_pairs(
 
 def _checked_parameters(method: str, parameters: dict[str, Any]) -> dict[str, int | None]:
     """The parameters as whole numbers of Python. TypeError if one is none, or the method does not have it."""
-    known = [p.name for p in inspect.signature(METHODS[method]).parameters.values() if p.kind is p.KEYWORD_ONLY]
+    signature = inspect.signature(METHODS[method])
+    known = {p.name: p.default for p in signature.parameters.values() if p.kind is p.KEYWORD_ONLY}
     for name, value in parameters.items():
         if name not in known:
             raise TypeError(f"find_pairs: unknown parameter {name!r} of {method}, expected one of {', '.join(known)}")
+        if value is None and known[name] is not None:
+            raise TypeError(f"find_pairs: {name} must be a whole number, got None")
         if value is not None and (isinstance(value, bool) or not isinstance(value, int | np.integer)):
-            raise TypeError(f"find_pairs: {name} must be a whole number, got {value!r}")
+            raise TypeError(f"find_pairs: {name} must be a whole number, got {shown(value)}")
+        if value is not None and not -_MOST <= value <= _MOST:
+            raise ValueError(f"find_pairs: {name} must be a whole number that int64 has, got {shown(value)}")
     return {name: None if value is None else int(value) for name, value in parameters.items()}
 
 
-def _as_float64(name: str, values: ArrayLike) -> np.ndarray:
-    """``values`` as float64. ValueError if they are no real numbers."""
-    try:
-        array = np.asarray(values)
-        if array.dtype.kind not in "biuf":
-            raise TypeError(array.dtype)
-        return array.astype(np.float64, copy=False)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"find_pairs: {name} must be real numbers, got {' '.join(str(error).split())}") from None
-
-
 def _checked(name: str, values: ArrayLike) -> np.ndarray:
-    array = _as_float64(name, values)
+    array = real_numbers(f"find_pairs: {name}", values)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"find_pairs: {name} must be (n, 3) float64, got {array.shape}")
     wrong = np.flatnonzero(~(np.abs(array) <= _FARTHEST).all(axis=1))
@@ -141,7 +139,7 @@ def _checked(name: str, values: ArrayLike) -> np.ndarray:
 
 
 def _checked_period(period: ArrayLike | None) -> np.ndarray:
-    lengths = np.zeros(3) if period is None else np.array(_as_float64("period", period))
+    lengths = np.zeros(3) if period is None else np.array(real_numbers("find_pairs: period", period))
     if lengths.shape != (3,) or not ((lengths >= 0.0) & (lengths <= _FARTHEST)).all():
-        raise ValueError(f"find_pairs: period must be three lengths, 0 on axes that do not wrap, got {period!r}")
+        raise ValueError(f"find_pairs: period must be three lengths, 0 on axes that do not wrap, got {shown(period)}")
     return lengths

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from particlesim.core.arguments import checked_arguments, real_numbers, shown
 from particlesim.core.constants import HALF_SPACE, MAX_MANIFOLD
 from particlesim.core.math3d import quat_multiply, quat_normalize
 from particlesim.geometry.narrow_phase.pair import pair_contact
@@ -45,6 +46,7 @@ class Separation(NamedTuple):
     points: np.ndarray
 
 
+@checked_arguments
 def separation(shape_a: Shape | str, pose_a: Any, shape_b: Shape | str, pose_b: Any) -> Separation:
     """Exact signed distance of two shapes.
 
@@ -67,10 +69,11 @@ def separation(shape_a: Shape | str, pose_a: Any, shape_b: Shape | str, pose_b: 
         For an unknown shape, one that needs parameters, a pose with numbers that are not finite, a zero quaternion or
         a size not above 0, and a half-space as the first shape.
     """
-    shapes = [_shape(shape_a), _shape(shape_b)]
+    shapes = [_shape("shape_a", shape_a), _shape("shape_b", shape_b)]
     if shapes[0].kind == HALF_SPACE:
-        raise ValueError("a half-space may be the second shape only")
-    (position_a, orientation_a, size_a), (position_b, orientation_b, size_b) = _checked(pose_a), _checked(pose_b)
+        raise ValueError("separation: shape_a: a half-space may be the second shape only")
+    position_a, orientation_a, size_a = _checked("pose_a", pose_a)
+    position_b, orientation_b, size_b = _checked("pose_b", pose_b)
     orientations = [_of_body_axes(q, shape) for q, shape in zip((orientation_a, orientation_b), shapes, strict=True)]
     points = np.empty((MAX_MANIFOLD, 3))
     offset = tuple((position_b - position_a).tolist())
@@ -81,41 +84,45 @@ def separation(shape_a: Shape | str, pose_a: Any, shape_b: Shape | str, pose_b: 
     return Separation(distance, np.array(normal), position_a + points[:count])
 
 
-def _shape(shape: Shape | str) -> Shape:
+def _shape(name: str, shape: Shape | str) -> Shape:
+    """A shape that is given, or of the catalogue. ValueError that names the argument if there is none."""
     if isinstance(shape, Shape):
         return shape
     if shape not in CATALOGUE:
-        raise ValueError(f"unknown shape '{shape}'; the catalogue has {', '.join(CATALOGUE)}")
+        raise ValueError(f"separation: {name}: unknown shape {shown(shape)}; the catalogue has {', '.join(CATALOGUE)}")
     try:
         return CATALOGUE[shape]()
     except TypeError as error:
-        raise ValueError(f"'{shape}' needs parameters; give a Shape, as from CATALOGUE['{shape}'](...)") from error
+        how = f"'{shape}' needs parameters; give a Shape, as from CATALOGUE['{shape}'](...)"
+        raise ValueError(f"separation: {name}: {how}") from error
 
 
 def _finite(values: Any, count: int, what: str) -> np.ndarray:
     """The values as an array (count,). ValueError if they are not that many finite numbers."""
     try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+        array = np.array(real_numbers(what, values))
+    except ValueError:
         array = np.full(0, np.nan)
     if array.shape != (count,) or not np.isfinite(array).all():
-        raise ValueError(f"{what} must be {count} finite numbers, not {values!r}")
+        raise ValueError(f"{what} must be {count} finite numbers, not {shown(values)}")
     return array
 
 
-def _checked(pose: Any) -> tuple[np.ndarray, np.ndarray, float]:
-    """Position, unit quaternion and size of a pose. ValueError if it has none."""
+def _checked(name: str, pose: Any) -> tuple[np.ndarray, np.ndarray, float]:
+    """Position, unit quaternion and size of a pose. ValueError that names the argument if it has none."""
+    what = f"separation: {name}:"
     try:
         position, orientation, size = Pose(*pose)
     except TypeError as error:
-        raise ValueError(f"a pose is (position, orientation, size), the last two optional, not {pose!r}") from error
-    at = _finite(position, 3, "a position")
-    quaternion = _finite(orientation, 4, "an orientation")
-    factor = _finite([size], 1, "a size")[0]
+        layout = "a pose is (position, orientation, size), the last two optional"
+        raise ValueError(f"{what} {layout}, not {shown(pose)}") from error
+    at = _finite(position, 3, f"{what} a position")
+    quaternion = _finite(orientation, 4, f"{what} an orientation")
+    factor = _finite([size], 1, f"{what} a size")[0]
     if not quaternion.any():
-        raise ValueError("an orientation must not be all zero")
+        raise ValueError(f"{what} an orientation must not be all zero")
     if factor <= 0.0:
-        raise ValueError(f"a size must be above 0, not {size}")
+        raise ValueError(f"{what} a size must be above 0, not {shown(size)}")
     # First by the largest: the squares of a tiny or huge quaternion are not numbers that float64 has.
     quaternion /= np.abs(quaternion).max()
     return at, quaternion / np.linalg.norm(quaternion), float(factor)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from particlesim.core.arguments import FARTHEST, checked_arguments, real_numbers, shown
 from particlesim.core.constants import CAPSULE, HALF_SPACE, MESH, POLYHEDRON, SPHERE
 from particlesim.core.polyhedra import POLYHEDRA
 from particlesim.geometry.convex_hull import (
@@ -123,10 +124,11 @@ def sphere() -> Shape:
     return Shape("sphere", SPHERE, np.zeros((1, 3)), (), 0.5, volume, moments, 0.5, 0.5, _UPRIGHT)
 
 
+@checked_arguments
 def capsule(length: float) -> Shape:
     """All points within 0.5 of a segment of the given length, along z; it is ``length`` + 1 long in all."""
-    if not 0.0 < length < np.inf:
-        raise ValueError(f"the length of a capsule must be a number above 0, not {length!r}")
+    if not 0.0 < length <= FARTHEST:
+        raise ValueError(f"the length of a capsule must be a number above 0, up to {FARTHEST:g} m, not {length!r}")
     ends = np.array([(0.0, 0.0, -0.5 * length), (0.0, 0.0, 0.5 * length)])
     volume, moments = capsule_moments(length, 0.5)
     return Shape("capsule", CAPSULE, ends, (), 0.5, volume, moments, 0.5 * length + 0.5, 0.5, _UPRIGHT)
@@ -163,6 +165,7 @@ def tree_mesh(name: str, vertices: np.ndarray, triangles: np.ndarray, remarks: t
     return Shape(name, MESH, vertices, (), 0.0, np.inf, none, radius, np.inf, _UPRIGHT, 0, triangles[order], remarks)
 
 
+@checked_arguments
 def hull(name: str, vertices: Any, rounding: float = 0.0) -> Shape:
     """All points within ``rounding`` of the convex hull of ``vertices`` (v, 3), as a shape about its centroid.
 
@@ -170,11 +173,13 @@ def hull(name: str, vertices: Any, rounding: float = 0.0) -> Shape:
     extent become one face, and its corners are moved into the plane.
     ValueError if the vertices are not finite or enclose no volume, or the rounding is not 0 or more.
     """
-    points = np.asarray(vertices, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-        raise ValueError(f"the vertices of '{name}' must be rows of three finite numbers")
-    if not 0.0 <= rounding < np.inf:
-        raise ValueError(f"the rounding of '{name}' must be a number of 0 or more, not {rounding!r}")
+    points = real_numbers(f"the vertices of '{name}'", vertices)
+    if points.ndim != 2 or points.shape[1] != 3 or not (np.abs(points) <= FARTHEST).all():
+        raise ValueError(f"the vertices of '{name}' must be rows of three finite numbers, up to {FARTHEST:g} m")
+    if not 0.0 <= rounding <= FARTHEST:
+        raise ValueError(
+            f"the rounding of '{name}' must be a number of 0 or more, up to {FARTHEST:g} m, not {rounding!r}"
+        )
     core = hull_polygons(name, points)
     return _about_centroid(name, core, core, rounding)
 
@@ -255,12 +260,16 @@ def _depth_of_centroid(vertices: np.ndarray, faces: Faces) -> float:
     return depth if depth >= 0.0 else -distance_from_hull(np.zeros(3), vertices)
 
 
+@checked_arguments
 def box(edges: Any = (1.0, 1.0, 1.0), rounding: float = 0.0) -> Shape:
     """A box with the given three edges."""
-    half = 0.5 * np.asarray(edges, dtype=np.float64)
+    half = 0.5 * real_numbers("edges of a box", edges)
+    if half.shape != (3,):
+        raise ValueError(f"edges of a box must be three numbers above 0, not {shown(edges)}")
     return hull("box", [(x, y, z) * half for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], rounding)
 
 
+@checked_arguments
 def pyramid(height: float = 1.0, rounding: float = 0.0) -> Shape:
     """A pyramid on a square base of edge 1, its top on +z."""
     base = [(x, y, 0.0) for x in (-0.5, 0.5) for y in (-0.5, 0.5)]
@@ -277,18 +286,21 @@ def _ring() -> np.ndarray:
     return 0.5 * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
+@checked_arguments
 def cylinder(length: float = 1.0, rounding: float = 0.0) -> Shape:
     """A cylinder of diameter 1 along z, as a prism of _ROUND sides within it."""
     ends = [np.column_stack([_ring(), np.full(_ROUND, z)]) for z in (-0.5 * length, 0.5 * length)]
     return hull("cylinder", np.concatenate(ends), rounding)
 
 
+@checked_arguments
 def cone(height: float = 1.0, rounding: float = 0.0) -> Shape:
     """A cone on a base of diameter 1, its top on +z, as a pyramid of _ROUND sides within it."""
     base = np.column_stack([_ring(), np.zeros(_ROUND)])
     return hull("cone", [*base, (0.0, 0.0, height)], rounding)
 
 
+@checked_arguments
 def mesh(file: str | Path, rounding: float = 0.0, unit: str = "m") -> Shape:
     """The convex hull of an STL, OBJ or PLY file whose numbers are in ``unit``: m, cm, mm, um or in.
 
@@ -312,7 +324,8 @@ def _polyhedron(name: str) -> Callable[..., Shape]:
         return hull(name, POLYHEDRA[name], rounding)
 
     make.__doc__ = f"The {name} of edge 1."
-    return make
+    make.__name__ = make.__qualname__ = name
+    return checked_arguments(make)
 
 
 cube, tetrahedron = _polyhedron("cube"), _polyhedron("tetrahedron")

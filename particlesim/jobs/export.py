@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from particlesim.core.arguments import checked_arguments
 from particlesim.core.constants import EXPORT_ENDINGS
 from particlesim.core.output_path import check_output
 from particlesim.jobs.compiling import compile_kernels
@@ -22,6 +23,7 @@ _Writer = Callable[[Path, Exported], list[Path]]
 _WRITERS: dict[str, _Writer] = dict(zip(EXPORT_ENDINGS, (write_pvd, write_glb, write_usd, write_xyz), strict=True))
 
 
+@checked_arguments
 def export(
     source: Scene | Trajectory | str | Path,
     path: str | Path,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from particlesim.core.arguments import checked_arguments
 from particlesim.core.extras import require
 from particlesim.core.figure import save_figure
 from particlesim.core.output_path import check_output
@@ -16,6 +17,7 @@ from particlesim.trajectory.analysis.table_files import write_csv, write_parquet
 from particlesim.trajectory.gsd_file import Trajectory
 
 
+@checked_arguments
 def plot(
     source: Scene | Trajectory | str | Path,
     path: Path,

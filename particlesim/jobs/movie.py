@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 
+from particlesim.core.arguments import checked_arguments
 from particlesim.core.constants import MOVIE_ENDINGS
 from particlesim.core.output_path import check_output, check_sequence, is_sequence
 from particlesim.jobs.compiling import compile_kernels
@@ -27,6 +29,7 @@ from particlesim.simulation.soundness import SimulationError
 from particlesim.trajectory.gsd_file import Trajectory, TrajectoryWriter
 
 
+@checked_arguments
 def simulate(
     scene: Scene | str | Path,
     path: str | Path,
@@ -97,6 +100,7 @@ def simulate(
     return summary
 
 
+@checked_arguments
 def render(
     source: Scene | Trajectory | str | Path,
     path: str | Path,
@@ -180,6 +184,7 @@ def _film(folder: Path, path: Path, movie: Movie, source: FrameSource, sent: int
     return Segments(folder, movie.fps, movie.size, movie.crf, sent, source.begin, path.suffix.lower())
 
 
+@checked_arguments
 def still(
     source: Scene | Trajectory | str | Path,
     path: str | Path,
@@ -209,10 +214,14 @@ def still(
 
     Raises
     ------
+    ValueError
+        For a time that is not finite.
     OutputError, RenderError, TrajectoryError, SceneError, SimulationError, OSError
         As for ``render``.
     """
     check_output(path, ".png")
+    if not math.isfinite(time):
+        raise ValueError(f"time must be a finite number of seconds, not {time!r}")
     with opened(source) as movable:
         platform.choose()
         _compile(movable, look, progress)

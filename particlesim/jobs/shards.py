@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from PIL import Image
 
+from particlesim.core.arguments import checked_arguments
 from particlesim.core.atomic_write import atomic_write
 from particlesim.core.output_path import check_output
 from particlesim.jobs.pictures import poster_place
@@ -71,6 +72,7 @@ def shard_table(shard: tuple[int, int], trajectory: Trajectory, look: Scene, fra
     }
 
 
+@checked_arguments
 def join(parts: Sequence[str | Path], path: str | Path) -> dict[str, Any]:
     """Make a movie (MP4) of its parts without encoding again, and the poster (PNG) that lies beside one of them.
 

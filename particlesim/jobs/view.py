@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 from pathlib import Path
 
+from particlesim.core.arguments import checked_arguments
 from particlesim.core.atomic_write import atomic_write
 from particlesim.core.output_path import check_output
 from particlesim.jobs.compiling import compile_kernels
@@ -30,6 +31,7 @@ class Page:
         return f'<iframe srcdoc="{inside}" style="width: 100%; aspect-ratio: 16/9; border: 0"></iframe>'
 
 
+@checked_arguments
 def view(
     source: Scene | Trajectory | str | Path,
     path: str | Path | None = None,

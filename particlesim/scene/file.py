@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from particlesim.core.arguments import checked_arguments
 from particlesim.scene import Scene
 from particlesim.scene.base import paths_from
 from particlesim.scene.errors import SceneError
@@ -15,6 +16,7 @@ from particlesim.scene.errors import SceneError
 _LARGEST = 20_000_000
 
 
+@checked_arguments
 def load_scene(path: str | Path) -> Scene:
     """Read and check a scene file (TOML). SceneError, in one line, if it cannot be read or is wrong."""
     return parse_scene(load_table(path), path)

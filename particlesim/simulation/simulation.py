@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from particlesim.broad_phase import METHODS
+from particlesim.core.arguments import checked_arguments, real_numbers, shown
+from particlesim.core.output_path import check_place
 from particlesim.core.parallel import limit_threads
 from particlesim.dynamics.settings import STEP_DISPLACEMENT
 from particlesim.dynamics.solver import Solver
@@ -37,11 +39,13 @@ class Simulation:
     processor if None). Neither changes the result by a bit. SceneError if the scene cannot be built.
     """
 
+    @checked_arguments
     def __init__(self, scene: Scene, broad_phase: str | None = None, threads: int | None = None) -> None:
         with limit_threads(threads):
             self._begin(scene, build(scene), broad_phase, threads)
 
     @classmethod
+    @checked_arguments
     def of_model(
         cls, scene: Scene, model: Model, broad_phase: str | None = None, threads: int | None = None
     ) -> Simulation:
@@ -63,7 +67,7 @@ class Simulation:
         self.scene, self._threads = scene, threads
         chosen = scene.solver.broad_phase
         if broad_phase not in (None, *METHODS):
-            raise ValueError(f"unknown broad phase '{broad_phase}'; there are {', '.join(METHODS)}")
+            raise ValueError(f"unknown broad_phase {shown(broad_phase)}; there are {', '.join(METHODS)}")
         self.broad_phase = broad_phase or chosen.kind
         parameters = chosen.model_dump(exclude={"kind"}) if broad_phase in (None, chosen.kind) else {}
         state, flow_state = (None, None) if states is None else states
@@ -81,6 +85,7 @@ class Simulation:
 
     # ---- checkpoints -------------------------------------------------------------------------------------------------
 
+    @checked_arguments
     def save(self, path: str | Path) -> None:
         """Write a checkpoint (NPZ): the model and everything that the next step depends on.
 
@@ -91,15 +96,19 @@ class Simulation:
 
         Raises
         ------
+        OutputError
+            If no file can appear there.
         OSError
             If it cannot be written.
         """
+        check_place(Path(path))
         done = {"steps": self.steps, "time_step": self.time_step, "broad_phase": self.broad_phase}
         write_checkpoint(
             path, Checkpoint(self.scene, self.model, self._solver.state, self._solver.counts, self._flow.state, done)
         )
 
     @classmethod
+    @checked_arguments
     def load(cls, path: str | Path, broad_phase: str | None = None, threads: int | None = None) -> Simulation:
         """Go on from a checkpoint: the same bytes as if the simulation had never been interrupted.
 
@@ -128,6 +137,7 @@ class Simulation:
 
     # ---- going forward -------------------------------------------------------------------------------------------
 
+    @checked_arguments
     def run(self, duration: float | None = None, steps: int | None = None) -> None:
         """Advance by ``duration`` [s], ending exactly there, or by a number of time steps.
 
@@ -136,28 +146,56 @@ class Simulation:
         if (duration is None) == (steps is None):
             raise ValueError("give a duration or a number of steps")
         if steps is not None:
+            if not 0 <= steps <= MOST_STEPS:
+                raise ValueError(f"steps must be a whole number from 0 to {MOST_STEPS:.0e}, not {shown(steps)}")
             for _ in range(steps):
                 self.step()
             return
         seconds = float(duration or 0.0)
         if not 0.0 <= seconds < math.inf:
             raise ValueError(f"duration must be a finite number of seconds of 0 or more, not {duration!r}")
-        if self.steps_of(seconds) > MOST_STEPS:
-            raise ValueError(f"duration = {seconds:g} s takes about {self.steps_of(seconds):.0e} time steps")
-        self.run_until(self.time + seconds)
+        self._check_end(seconds, "duration", seconds)
+        self._run_until(self.time + seconds)
 
+    @checked_arguments
     def steps_of(self, duration: float) -> float:
-        """About how many time steps a ``duration`` [s] takes, as long as they stay as they are."""
+        """About how many time steps a ``duration`` [s] takes, as long as they stay as they are.
+
+        ValueError if it is not finite.
+        """
+        if not math.isfinite(duration):
+            raise ValueError(f"duration must be a finite number of seconds, not {duration!r}")
         return math.ceil(duration / self.next_time_step() - 1e-9)
 
+    @checked_arguments
     def run_until(self, end: float) -> None:
-        """Advance to the time ``end`` [s], in equal steps as long as the automatic time step stays the same."""
+        """Advance to the time ``end`` [s], in equal steps as long as the automatic time step stays the same.
+
+        ValueError for what there would be no end to.
+        """
+        self._check_end(end - self.time, "end", end)
+        self._run_until(end)
+
+    def _run_until(self, end: float) -> None:
         while self.time < end:
             self.step_towards(end)
 
+    def _check_end(self, left: float, name: str, value: float) -> None:
+        """ValueError, which names an argument and its value, for what it takes years to come to."""
+        if not math.isfinite(left):
+            raise ValueError(f"{name} must be a finite number of seconds, not {value!r}")
+        if left > 0.0 and self.steps_of(left) > MOST_STEPS:
+            raise ValueError(f"{name} = {value:g} s takes about {self.steps_of(left):.0e} time steps")
+
+    @checked_arguments
     def step_towards(self, end: float) -> None:
-        """One of the time steps of ``run_until``: it ends at the time ``end`` [s] or before."""
+        """One of the time steps of ``run_until``: it ends at the time ``end`` [s] or before.
+
+        ValueError if that has passed.
+        """
         left = end - self.time
+        if not 0.0 < left < math.inf:
+            raise ValueError(f"end = {end:g} s is not after the present, {self.time:g} s")
         parts = math.ceil(left / self.next_time_step() - 1e-9)
         self.step(left / max(parts, 1))
         if parts <= 1:
@@ -174,6 +212,7 @@ class Simulation:
             return min(self._solver.longest_substep(STEP_DISPLACEMENT), self._frame_time)
         return self._solver.longest_step(STEP_DISPLACEMENT, self._frame_time)
 
+    @checked_arguments
     def step(self, time_step: float | None = None) -> None:
         """One time step [s], the automatic one if not given.
 
@@ -189,6 +228,7 @@ class Simulation:
                 self._solver.change_particles(*changed)
         self.steps += 1
 
+    @checked_arguments
     def add_force(self, force: Callable[[Particles], np.ndarray]) -> None:
         """Let a force act on the particles from now on, in kicks between their free paths.
 
@@ -206,7 +246,7 @@ class Simulation:
         """
 
         def checked() -> np.ndarray:
-            found = np.asarray(force(self.particles), dtype=np.float64)
+            found = real_numbers("what force returns", force(self.particles))
             expected = (self.model.system.particles, 3)
             if found.shape != expected or not np.isfinite(found).all():
                 raise ValueError(f"force must return finite numbers of the shape {expected}, not {found.shape}")

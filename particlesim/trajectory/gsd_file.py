@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import gsd.hoomd
 import numpy as np
 
+from particlesim.core.arguments import checked_arguments, shown
 from particlesim.core.rotations import conjugates, quaternion_products
 from particlesim.scene import Scene
 from particlesim.scene.file import stored_scene
@@ -123,6 +124,7 @@ class Trajectory:
     Of files that other programs wrote, such as HOOMD-blue, ``assumed`` says line by line what they leave open.
     """
 
+    @checked_arguments
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._chunks = chunks = Chunks(self.path)
@@ -165,6 +167,7 @@ class Trajectory:
             raise TrajectoryError(f"{self.path}: damaged: its particles are not those of its scene")
         return scene
 
+    @checked_arguments
     def table(self, which: str = "time") -> np.ndarray:
         """The numbers of the run, as a structured array: of energies, momenta and so on, a row for each frame.
 
@@ -188,6 +191,7 @@ class Trajectory:
         """
         return self._measurements.table(which)
 
+    @checked_arguments
     def plot(self, what: str | None = None) -> Figure:
         """A figure of the run (matplotlib's): all panels on a page, or one.
 
@@ -225,24 +229,31 @@ class Trajectory:
         with reading(self.path):
             return self._chunks.read(name).tobytes().decode() if self._chunks.has(name) else None
 
+    def _check_number(self, k: int) -> None:
+        """IndexError if there is no frame ``k``."""
+        if not 0 <= k < len(self):
+            raise IndexError(f"{self.path}: frames are 0 to {len(self) - 1}, there is no {shown(k)}")
+
+    @checked_arguments
     def time(self, k: int) -> float:
-        """The time of frame ``k`` [s]."""
+        """The time of frame ``k`` [s], 0 the first."""
+        self._check_number(k)
         with reading(self.path):
             if not self._is_own:
                 return k / FRAME_RATE
             return float(self._chunks.rows(LOG + "time", 1, (0.0,), k)[0, 0])
 
+    @checked_arguments
     def ledger(self, k: int) -> Ledger | None:
         """The ledger of frame ``k`` alone, 0 the first; None where the file has none."""
-        if not 0 <= k < len(self):
-            raise IndexError(k)
+        self._check_number(k)
         with reading(self.path):
             return read_ledger(self._chunks, k) if self._is_own else None
 
+    @checked_arguments
     def __getitem__(self, k: int) -> Frame:
         """Frame ``k``, 0 the first; positions and motion as the file stores them, in single precision."""
-        if not 0 <= k < len(self):
-            raise IndexError(k)
+        self._check_number(k)
         with reading(self.path):
             if not self._is_own:
                 check_same_particles(self._chunks, self.header, k)
@@ -268,6 +279,7 @@ class Trajectory:
             )
 
 
+@checked_arguments
 def open(path: str | Path) -> Trajectory:
     """Open a trajectory: what ``particlesim simulate`` wrote, or a GSD file of HOOMD-blue and others.
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from particlesim.core.arguments import checked_arguments
 from particlesim.core.atomic_write import atomic_write
 from particlesim.core.extras import require
 from particlesim.core.output_path import check_output
@@ -28,6 +29,7 @@ class SweepResult(NamedTuple):
     written: list[Path]  # the table, and the files of the figure
 
 
+@checked_arguments
 def sweep(
     source: str | Path | Sequence[Case],
     path: str | Path,
@@ -64,6 +66,8 @@ def sweep(
 
     Raises
     ------
+    ValueError
+        If there are no cases.
     SceneError
         If the sweep file or a case is wrong; found out before any work.
     FigureError
@@ -78,6 +82,8 @@ def sweep(
     if path.suffix == ".parquet":
         require("pyarrow", "parquet")
     cases = load_sweep(source) if isinstance(source, str | Path) else list(source)
+    if not cases:
+        raise ValueError("sweep: source has no cases")
     values = list(dict.fromkeys(key for case in cases for key in case.values))
     if figure is not None:
         check_columns([*values, *COLUMNS], *figure)
