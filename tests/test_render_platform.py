@@ -218,8 +218,7 @@ def test_an_ffmpeg_that_is_none_is_named_before_any_work(monkeypatch, tmp_path):
 
 
 def test_a_context_that_is_lost_is_one_line(monkeypatch, tmp_path):
-    from particlesim.rendering.gl import pyrender_bridge  # noqa: PLC0415  (OpenGL's platform is chosen first)
-
+    pyrender_bridge = platform.open_bridge(platform.choose())
     draw, pictures = pyrender_bridge.Canvas.draw, []
 
     def lose(canvas, picture):
