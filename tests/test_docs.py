@@ -49,7 +49,8 @@ def test_every_example_in_python_runs(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("page", sorted((DOCS / "scene").glob("*.md")), ids=lambda page: page.stem)
-def test_every_table_on_a_page_makes_a_scene(page):
+def test_every_table_on_a_page_makes_a_scene(page, monkeypatch):
+    monkeypatch.chdir(DOCS.parent / "scenes")  # where files are that they name
     examples = blocks(page.read_text(), "toml")
     assert examples
     for _, text in examples:
