@@ -7,6 +7,8 @@ from scipy.optimize import brentq
 from particlesim.simulation.simulation import Simulation
 from tests.worlds import scene
 
+pytestmark = pytest.mark.slow
+
 GRAVITY = (0.0, 0.0, -9.81)
 
 # ---- silos ---------------------------------------------------------------------------------------------------------

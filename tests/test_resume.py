@@ -62,6 +62,7 @@ def some(**settings):
     return gas(3, **{"title": "Left", "duration": 2.5, "movie": {"resolution": [64, 64], "fps": 30}, **settings})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["run.gsd", "movie.mp4"])
 def test_killed_at_any_moment_it_ends_as_if_it_had_not_been(tmp_path, name):
     scene, path = tmp_path / "scene.toml", tmp_path / name
