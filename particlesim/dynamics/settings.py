@@ -173,6 +173,29 @@ CHANGE_MARGIN = 1.5
 # Searches of contacts in a substep, until no bodies may meet unforeseen. Fewer: `unresolved` counts sooner.
 MAX_CONTACT_SEARCHES = 4
 
+# ---- lasting contacts: sleep -----------------------------------------------------------------------------------------
+
+# What has moved on by less than the first fraction of its inscribed radius in so many times sqrt(bounding radius /
+# gravity), in which it would fall by eight radii, sleeps if it is in balance [1]. What starts to fall, slide or tip by
+# 1.3e-4 of its weight moves more. Larger or shorter: what moves ever so slowly is stopped; the other way round: heaps
+# that tremble take longer to fall asleep.
+SLEEP_WAY = 1e-3
+SLEEP_TIME = 4.0
+
+# It is in balance if forces and weight come to less than this fraction of what friction at its contacts can hold, or
+# the last of its weight [1], and torques about its middle to no more at the bounding radius. It wakes after a step in
+# which they come to more than the second, and where they come to more than the third the step is taken again with it
+# awake. Larger: what leans on it more than before is not seen; smaller: more wakes about what is awake.
+SLEEP_BALANCE = 0.02
+WAKE_BALANCE = 0.06
+WAKE_AT_ONCE = 0.5
+SLEEP_LEAST_BALANCE = 1e-4
+
+# Nor does it sleep while anything touches it that moves faster than by a fall from a millionth of an inscribed radius:
+# this fraction of the speed of a fall from all of it [1]. Larger: what rolls over sleepers is felt late; smaller: heaps
+# that tremble take longer to fall asleep.
+SLEEP_SPEED = 1e-3
+
 # ---- lasting contacts: the step --------------------------------------------------------------------------------------
 
 # Parts of a substep in which gravity acts and gaps are followed. More: stacks and heaps are held better by as many

@@ -110,9 +110,8 @@ class Solver:
         self.counts.each = np.where(origin >= 0, np.append(self.counts.each, 0)[origin], 0).astype(np.int64)
         self._take(self.model.with_particles(particles))
         self.state = self._begin(before.time)
-        if len(before.lasting):
-            self.state.lasting = np.append(before.lasting, np.int8(0))[origin]
-            self.state.forces = forces_of(before.forces, origin, bodies, len(self._system.body))
+        self.state.remember(before, origin)
+        self.state.forces = forces_of(before.forces, origin, bodies, len(self._system.body))
 
     def _begin(self, now: float) -> SolverState:
         """The state of a start at a time [s]."""
@@ -306,7 +305,7 @@ class Solver:
         place_kinematic(system.body[system.particles :], system.motion, state.time)
         first = system.particles
         if self._resting.carried:
-            self._resting.finish()
+            self.counts.bear(self._resting.finish(state))
             first = 0
         times.append(time_within_skins(system, state.neighbours.reference, first, system.bounded))
         state.time_within_skins = min(times)

@@ -21,6 +21,9 @@ SEEN = record([("position", "f8", (3,)), ("orientation", "f8", (4,))])
 # the first of them [m], the force on the second [N], and the torque against rolling [N m].
 FORCE = record([("contact", "i8"), ("arm", "f8", (3,)), ("force", "f8", (3,)), ("torque", "f8", (3,))])
 
+# Since when a particle has been still [s], and how far its surface had come by then [m].
+STILL = record([("since", "f8"), ("displacement", "f8")])
+
 
 @dataclass
 class Counts:
@@ -40,11 +43,17 @@ class Counts:
     def add(self, total: np.ndarray, borne: Borne) -> None:
         """Add what the islands of a substep accumulated (c,), and what lasting contacts bore."""
         self.impacts += int(total[IMPACTS])
-        self.virial += float(total[VIRIAL]) + borne.virial
+        self.virial += float(total[VIRIAL])
         columns = slice(WALLS, LOST), slice(LOST, SHEAR), slice(SHEAR, WORK)
         for sums, place in zip((self.wall_impulse, self.dissipated, self.wall_shear), columns, strict=True):
             sums.flat[: len(total[place])] += total[place]
-        self.work += float(total[WORK:].sum()) + borne.work
+        self.work += float(total[WORK:].sum())
+        self.bear(borne)
+
+    def bear(self, borne: Borne) -> None:
+        """Add what lasting contacts bore."""
+        self.virial += borne.virial
+        self.work += borne.work
         self.wall_impulse += borne.wall_impulse
         self.wall_shear += borne.wall_shear
         self.dissipated += borne.lost
@@ -66,6 +75,18 @@ class SolverState:
     clearance: np.ndarray  # beside ``neighbours.other``: how far apart they were, plus displacements [m]
     forces: np.ndarray  # (k,) FORCE
     lasting: np.ndarray  # (n,) int8, whether a particle was in lasting contact, (0,) where none comes to be
+    still: np.ndarray  # (n,) STILL, (0,) where nothing comes to rest
+    asleep: np.ndarray  # (n,) bool, whether a particle sleeps, (0,) where nothing comes to rest
+
+    def remember(self, before: SolverState, origin: np.ndarray) -> None:
+        """Take over what was known of particles ``before``: of those that each of the present ones was, -1 for none."""
+        if not len(before.lasting):
+            return
+        self.lasting = np.append(before.lasting, np.int8(0))[origin]
+        self.asleep = np.append(before.asleep, np.False_)[origin]
+        self.still["since"] = np.append(before.still["since"], before.time)[origin]
+        way = before.still["displacement"] - before.displacement[: len(before.still)]
+        self.still["displacement"] = np.append(way, 0.0)[origin]
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Everything by name; what is not an array as one of no dimensions."""
@@ -92,16 +113,15 @@ class SolverState:
 
 
 def nothing_remembered(system: System, comes_to_rest: bool) -> tuple[np.ndarray, ...]:
-    """The last six arrays of a SolverState at a start; they are empty where nothing comes to rest."""
+    """The last eight arrays of a SolverState at a start; they are empty where nothing comes to rest."""
     body, known = system.body, system.bounded if comes_to_rest else 0
     seen = np.zeros(known, dtype=SEEN)
     for name in SEEN.names or ():
         seen[name] = body[name][:known]
-    standing, lasting = (
-        np.zeros(len(body) if known else 0, np.int64),
-        np.zeros(system.particles if known else 0, np.int8),
-    )
-    return standing, seen, np.zeros(known), np.empty(0), np.empty(0, dtype=FORCE), lasting
+    particles = system.particles if known else 0
+    standing, lasting = np.zeros(len(body) if known else 0, np.int64), np.zeros(particles, np.int8)
+    still, asleep = np.zeros(particles, dtype=STILL), np.zeros(particles, np.bool_)
+    return standing, seen, np.zeros(known), np.empty(0), np.empty(0, dtype=FORCE), lasting, still, asleep
 
 
 def digest(*arrays: np.ndarray) -> str:

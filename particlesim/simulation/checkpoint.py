@@ -22,7 +22,7 @@ from particlesim.scene import Scene
 from particlesim.scene.file import SceneError, stored_scene
 from particlesim.simulation.flow import FlowState
 
-_FORMAT = 4
+_FORMAT = 5
 
 
 class CheckpointError(ValueError):

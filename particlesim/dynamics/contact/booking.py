@@ -35,6 +35,18 @@ class Borne(NamedTuple):
 NOTHING_BORNE = Borne(np.zeros(6), np.zeros((6, 3)), 0.0, np.zeros(len(DISSIPATION)), 0.0, False)
 
 
+def together(one: Borne, other: Borne) -> Borne:
+    """What two of them bore."""
+    return Borne(
+        one.wall_impulse + other.wall_impulse,
+        one.wall_shear + other.wall_shear,
+        one.virial + other.virial,
+        one.lost + other.lost,
+        one.work + other.work,
+        one.unresolved or other.unresolved,
+    )
+
+
 def columns_needed(system: System) -> int:
     """How many columns there must be: no more than something can be in, for there is a row for each particle."""
     if len(system.motion):

@@ -86,17 +86,19 @@ def _approach_to_surroundings(system, meshes, spin, i, j, duration):
 
 
 @entry_kernel
-def expected_changes(system, neighbours, spin, duration, gain):
+def expected_changes(system, neighbours, spin, held, duration, gain):
     """By how much the surface velocity of each body may change in a step (n,) [m/s]: by ``gain``, or as others push.
 
-    Of obstacles it does as they swing.
+    Of obstacles it does as they swing, of what is ``held`` (n,) not at all.
     """
-    system, neighbours, spin = without_refcounts((system, neighbours, spin))
+    system, neighbours, spin, held = without_refcounts((system, neighbours, spin, held))
     change = np.zeros(len(system.body))
     for j in range(system.particles, len(system.body)):
         if system.body[j].kind == KINEMATIC:
             change[j] = largest_acceleration(system, system.body[j]) * duration
     for i in range(system.particles):
+        if held[i]:
+            continue
         place = neighbours.place[i]
         for near in range(neighbours.start[place], neighbours.start[place + 1]):
             j = neighbours.body[neighbours.other[near]]

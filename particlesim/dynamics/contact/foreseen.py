@@ -86,25 +86,25 @@ def _meets_surroundings(system, meshes, motion, ahead, i, j):
 
 @entry_kernel
 def unforeseen(system, neighbours, motion, search, ahead, carried):
-    """Whether any of the bodies that are ``carried`` (n,), obstacles among them, may meet another, unknown to contacts.
+    """Whether any of the bodies that are ``carried`` (n,), or held, may meet another, unknown to contacts.
 
     What is carried goes straight until it is struck, and has gained and lost what it does by the end of the step: it is
-    not to be struck by what is free, but for what rebounds in full.
+    not to be struck by what is free, but for what rebounds in full. What is held may be.
     """
     system, neighbours, motion, search, ahead = without_refcounts((system, neighbours, motion, search, ahead))
     for i in range(system.particles):
-        place, now = neighbours.place[i], search.round[i]
+        place, now, held = neighbours.place[i], search.round[i], motion.held[i]
         if now < 0:
             continue
         for near in range(neighbours.start[place], neighbours.start[place + 1]):
             j = neighbours.body[neighbours.other[near]]
-            if not (carried[i] or (carried[j] and j < system.particles)):
+            if not ((carried[i] and not held) or (carried[j] and j < system.particles and not motion.held[j])):
                 continue
             if search.round[j] < 0 or search.round[j] > now or (search.round[j] == now and j > i):
                 clear = search.clearance[near] - search.displacement[i] - search.displacement[j]
                 if _meet(system, motion, ahead, carried, (i, j), clear):
                     return True
         for j in range(system.bounded, len(system.body)):
-            if carried[i] and _meets_surroundings(system, system.meshes, motion, ahead, i, j):
+            if carried[i] and not held and _meets_surroundings(system, system.meshes, motion, ahead, i, j):
                 return True
     return False

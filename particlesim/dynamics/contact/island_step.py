@@ -335,11 +335,15 @@ def step_islands(system, islands, mover, interval, ahead, first, last):
 
 
 @entry_kernel
-def write_obstacles(body, mover, first):
-    """Write obstacles as the sweeps see them."""
-    body, mover = without_refcounts((body, mover))
-    for i in range(first, len(body)):
-        write_mover(mover[i], body[i], -1)
+def write_obstacles(body, mover, asleep):
+    """Write obstacles as the sweeps see them, and particles that sleep (n,): nothing pushes these either."""
+    body, mover, asleep = without_refcounts((body, mover, asleep))
+    for i in range(len(body)):
+        if i >= len(asleep) or asleep[i]:
+            write_mover(mover[i], body[i], -1)
+            mover[i].inverse_mass = 0.0
+            for k in range(6):
+                mover[i].inverse_inertia[k] = 0.0
 
 
 @entry_kernel

@@ -28,7 +28,8 @@ from particlesim.core.math3d import (
 from particlesim.core.math3d import to_vec3 as vec
 from particlesim.dynamics.contact.clearance import turning_speed
 from particlesim.dynamics.contact.contact_records import CONTACT_POINT, CONTACT_TERMS, OF_B, OF_EDGES
-from particlesim.dynamics.contact.law import rest_speed, rest_threshold, restitution_of, tangent_of
+from particlesim.dynamics.contact.effective_mass import response, rolling_mass, tangential_mass
+from particlesim.dynamics.contact.law import rest_speed, rest_threshold, restitution_of
 from particlesim.dynamics.contact.mesh_patches import MAX_PATCH_POINTS, gather_patches, new_patches, patch_corners
 from particlesim.dynamics.contact.normal_owner import normal_owner, write_edges
 from particlesim.dynamics.settings import (
@@ -45,7 +46,7 @@ from particlesim.dynamics.settings import (
 from particlesim.dynamics.solver_state import SolverState
 from particlesim.geometry.narrow_phase.pair import pair_manifold
 from particlesim.geometry.support import is_half_space, is_mesh, is_sphere
-from particlesim.model.bodies import BODY, angular_velocity_change, per_mass, placed
+from particlesim.model.bodies import BODY, placed
 from particlesim.model.domain import nearest_image
 
 
@@ -54,6 +55,7 @@ class Motion(NamedTuple):
 
     spin: np.ndarray  # (n, 3) angular velocities [rad/s]
     change: np.ndarray  # (n,) by how much surface velocities may change [m/s]
+    held: np.ndarray  # (n,) bool, what stays where it is: particles that sleep, and obstacles that do not move
     duration: float  # [s]
 
 
@@ -112,37 +114,6 @@ def _pair_points(system, a, b, reach, tilt, room):
 
 
 @kernel
-def _response(a, b, arm_a, arm_b, impulse):
-    """The change of the velocity of b against a at a point by an impulse on b, and its reaction on a."""
-    of_a = add(
-        (per_mass(a, impulse[0]), per_mass(a, impulse[1]), per_mass(a, impulse[2])),
-        cross(angular_velocity_change(a, cross(arm_a, impulse)), arm_a),
-    )
-    of_b = add(
-        (per_mass(b, impulse[0]), per_mass(b, impulse[1]), per_mass(b, impulse[2])),
-        cross(angular_velocity_change(b, cross(arm_b, impulse)), arm_b),
-    )
-    return add(of_a, of_b)
-
-
-@kernel
-def _tangential_mass(a, b, arm_a, arm_b, normal):
-    """The smallest effective mass across the normal: 1 / the larger eigenvalue of the inverse mass there."""
-    first = tangent_of(normal)
-    second = cross(normal, first)
-    of_first, of_second = _response(a, b, arm_a, arm_b, first), _response(a, b, arm_a, arm_b, second)
-    p, q, r = dot(of_first, first), dot(of_second, second), dot(of_first, second)
-    return 1.0 / (0.5 * (p + q) + np.sqrt(0.25 * (p - q) * (p - q) + r * r))
-
-
-@kernel
-def _rolling_mass(a, b):
-    """The smallest effective moment of inertia of two bodies against each other [kg m^2]."""
-    of_a, of_b = a.inverse_inertia, b.inverse_inertia
-    return 1.0 / (max(of_a[0], of_a[1], of_a[2]) + max(of_b[0], of_b[1], of_b[2]))
-
-
-@kernel
 def _displacement(system, motion, i, j):
     """How far the surfaces of two bodies may move against each other in the step [m]."""
     a, b, turning = system.body[i], system.body[j], norm(load_vec3(motion.spin, j))
@@ -195,23 +166,23 @@ def _turning_slack(system, motion, pair, offset, owner):
 def _write_point(system, motion, p, terms, pair, arm, offset):
     """Write contact point ``p`` of a pair of bodies, whose ``normal`` is known, and its ``terms``."""
     a, b, normal = system.body[pair[0]], system.body[pair[1]], vec(p.normal)
-    law = system.law[a.material, b.material]
+    law, held = system.law[a.material, b.material], motion.held[pair[1]]
     arm_b = sub(arm, offset)
     p.a, p.b = pair
     set_vec3(p.arm_a, arm)
     set_vec3(p.arm_b, arm_b)
-    response = _response(a, b, arm, arm_b, normal)
-    set_vec3(p.response, response)
-    p.normal_mass, p.tangential_mass = 1.0 / dot(response, normal), 0.0
+    by_unit = response(a, b, held, arm, arm_b, normal)
+    set_vec3(p.response, by_unit)
+    p.normal_mass, p.tangential_mass = 1.0 / dot(by_unit, normal), 0.0
     p.friction, p.static_friction = law.friction, law.static_friction
     if law.static_friction > 0.0:
-        p.tangential_mass = _tangential_mass(a, b, arm, arm_b, normal)
+        p.tangential_mass = tangential_mass(a, b, held, arm, arm_b, normal)
     p.push = 0.0
     set_vec3(p.wanted, (0.0, 0.0, 0.0))
     set_vec3(p.drag, (0.0, 0.0, 0.0))
     terms.inradius = min(a.inradius, b.inradius)
     terms.restitution, terms.threshold = law.restitution, rest_threshold(system, a, b)
-    terms.rolling_friction, terms.rolling_mass = law.rolling_friction, _rolling_mass(a, b)
+    terms.rolling_friction, terms.rolling_mass = law.rolling_friction, rolling_mass(a, b, held)
     of_a = add(vec(a.velocity), cross(load_vec3(motion.spin, pair[0]), arm))
     of_b = add(vec(b.velocity), cross(load_vec3(motion.spin, pair[1]), arm_b))
     terms.approach = dot(normal, sub(of_b, of_a))
@@ -325,7 +296,8 @@ def _most_points(meshes):
 def contacts_of(system, neighbours, motion, search, indices, first, last):
     """Contact points (m,) and their terms of bodies ``indices[first:last]``, those of the present round of a search.
 
-    Of pairs within the round, and of those with bodies of later rounds: each stands there once.
+    Of pairs within the round, and of those with bodies of later rounds: each stands there once. Of two particles the
+    second is the one that sleeps. Between bodies that are both held there are none.
     """
     system, neighbours, motion, search, indices = without_refcounts((system, neighbours, motion, search, indices))
     room = _Room(np.empty((MAX_MANIFOLD, 3)), np.empty(MAX_MANIFOLD))
@@ -334,19 +306,23 @@ def contacts_of(system, neighbours, motion, search, indices, first, last):
     size = 0
     for k in range(first, last):
         i = indices[k]
-        place, now = neighbours.place[i], search.round[i]
+        place, now, held = neighbours.place[i], search.round[i], motion.held[i]
         for j in range(system.bounded, len(system.body)):
+            if held and motion.held[j]:
+                continue
             if size + most > len(points):
                 points, terms = grow_records(points), grow_records(terms)
             size, loose = _add_surroundings(system, system.meshes, motion, (i, j), room, (points, terms), size)
             search.loose[i] |= loose
         for near in range(neighbours.start[place], neighbours.start[place + 1]):
             j = neighbours.body[neighbours.other[near]]
-            if search.round[j] >= 0 and (search.round[j] < now or j < i):
+            if (held and motion.held[j]) or (search.round[j] >= 0 and (search.round[j] < now or j < i)):
                 continue
             if size + MAX_MANIFOLD > len(points):
                 points, terms = grow_records(points), grow_records(terms)
             come, pair = search.displacement[i] + search.displacement[j], (min(i, j), max(i, j))
+            if motion.held[pair[0]] and pair[1] < system.particles:
+                pair = pair[1], pair[0]
             clear = search.clearance[near] - come
             size, clear, loose = add_contact(system, motion, pair, clear, room, (points, terms), size)
             search.clearance[near] = clear + come

@@ -25,12 +25,13 @@ def _root(root, i):
 
 
 @entry_kernel
-def _roots(points, particles):
-    """The smallest member of the island of each particle, (particles,)."""
-    points = without_refcounts(points)
+def _roots(points, asleep):
+    """The smallest member of the island of each particle, (n,); what sleeps joins nothing."""
+    points, asleep = without_refcounts((points, asleep))
+    particles = len(asleep)
     root = np.arange(particles)
     for k in range(len(points)):
-        if points[k].b < particles:
+        if points[k].b < particles and not asleep[points[k].b]:
             a, b = _root(root, points[k].a), _root(root, points[k].b)
             root[max(a, b)] = min(a, b)
     for i in range(particles):
@@ -38,8 +39,10 @@ def _roots(points, particles):
     return root
 
 
-def gathered(points: np.ndarray, terms: np.ndarray, seeds: np.ndarray, particles: int) -> Islands:
-    """The islands of contact points (m,) that have a seed among their members, by their smallest members.
+def gathered(points: np.ndarray, terms: np.ndarray, seeds: np.ndarray, asleep: np.ndarray) -> Islands:
+    """The islands of contact points (m,) that have a seed among their members or touch what sleeps, in order.
+
+    That is the order of their smallest members.
 
     Parameters
     ----------
@@ -47,21 +50,24 @@ def gathered(points: np.ndarray, terms: np.ndarray, seeds: np.ndarray, particles
         In any order but that the points of a pair of bodies have theirs.
     seeds : (k,) int
         Particles.
-    particles : int
-        How many there are.
+    asleep : (n,) bool
+        Whether a particle sleeps: it is an obstacle then.
     """
-    root = _roots(points, particles)
-    seeded = np.zeros(particles, dtype=np.bool_)
+    particles = len(asleep)
+    root = _roots(points, asleep)
+    other = points["b"][points["b"] < particles]
+    seeded, touched = np.zeros((2, particles), dtype=np.bool_)
     seeded[root[seeds]] = True
+    seeded[root[points["a"][points["b"] < particles][asleep[other]]]] = True
     of_point = root[points["a"]]
     # One number each, to sort which takes a twentieth of the time that three keys do; the pairs nearly are in order.
     bodies = int(points["b"].max(initial=0)) + 1
     order = np.argsort((of_point * particles + points["a"]) * bodies + points["b"], kind="stable")
     order = order[seeded[of_point[order]]]
     points, terms, of_point = points[order], terms[order], of_point[order]
-    touched = np.zeros(particles, dtype=np.bool_)
     touched[points["a"]] = True
     touched[points["b"][points["b"] < particles]] = True
+    touched &= ~asleep
     member = np.flatnonzero(touched)
     member = member[np.argsort(root[member], kind="stable")]
     starts = np.flatnonzero(np.diff(of_point, prepend=-1))
@@ -79,18 +85,21 @@ def _hand_down(points, terms, first, last, memory):
     for k in range(len(memory)):
         nearest, least = -1, np.inf
         for m in range(first[k], last[k]):
-            shift = sub(vec(points[m].arm_a), vec(memory[k].arm))
+            arm = vec(points[m].arm_a) if points[m].a < points[m].b else vec(points[m].arm_b)
+            shift = sub(arm, vec(memory[k].arm))
             if dot(shift, shift) < least:
                 nearest, least = m, dot(shift, shift)
         if nearest >= 0:
+            sign = 1.0 if points[nearest].a < points[nearest].b else -1.0
             for axis in range(3):
-                terms[nearest].force[axis] += memory[k].force[axis]
-                terms[nearest].torque[axis] += memory[k].torque[axis]
+                terms[nearest].force[axis] += sign * memory[k].force[axis]
+                terms[nearest].torque[axis] += sign * memory[k].torque[axis]
 
 
 def _contact_of(points: np.ndarray, bodies: int) -> np.ndarray:
-    """A number for the pair of bodies at each contact point."""
-    return points["a"].astype(np.int64) * bodies + points["b"]
+    """A number for the pair of bodies at each contact point, whichever is the first."""
+    a, b = points["a"].astype(np.int64), points["b"].astype(np.int64)
+    return np.minimum(a, b) * bodies + np.maximum(a, b)
 
 
 def warm_start(islands: Islands, forces: np.ndarray, bodies: int) -> None:
@@ -130,9 +139,21 @@ def forces_of(forces: np.ndarray, origin: np.ndarray, before: int, now: int) -> 
 
 def forces_after(islands: Islands, bodies: int) -> np.ndarray:
     """The forces of contact points for the step after, (m,) FORCE: those that there are."""
-    points, terms = islands.points, islands.terms
-    acting = terms["force"].any(axis=1)
-    forces = np.empty(int(acting.sum()), dtype=FORCE)
-    forces["contact"], forces["arm"] = _contact_of(points, bodies)[acting], points["arm_a"][acting]
-    forces["force"], forces["torque"] = terms["force"][acting], terms["torque"][acting]
+    return _forces(islands.points, islands.terms["force"], islands.terms["torque"], bodies)
+
+
+def mean_forces(islands: Islands, bodies: int, duration: float) -> np.ndarray:
+    """The forces of contact points in the step, which took ``duration`` [s], (m,) FORCE: those that there were."""
+    terms = islands.terms
+    return _forces(islands.points, terms["impulse"] / duration, terms["angular_impulse"] / duration, bodies)
+
+
+def _forces(points: np.ndarray, force: np.ndarray, torque: np.ndarray, bodies: int) -> np.ndarray:
+    """The forces [N] that act at contact points (m,), and torques against rolling [N m], as FORCE."""
+    acting = force.any(axis=1)
+    points, turned = points[acting], (points["a"] > points["b"])[acting][:, None]
+    forces = np.empty(len(points), dtype=FORCE)
+    forces["contact"], forces["arm"] = _contact_of(points, bodies), np.where(turned, points["arm_b"], points["arm_a"])
+    forces["force"] = np.where(turned, -force[acting], force[acting])
+    forces["torque"] = np.where(turned, -torque[acting], torque[acting])
     return forces

@@ -63,13 +63,18 @@ class Pair(NamedTuple):
 
 
 @entry_kernel
-def place_obstacles_ahead(system, duration, ahead):
-    """Write into ``ahead`` (n,) BODY where obstacles are after ``duration`` [s]."""
-    system, ahead = without_refcounts((system, ahead))
-    for i in range(system.particles, len(system.body)):
-        b = system.body[i]
-        ahead[i] = b
-        set_pose(ahead[i], *place_on_path(path_of_body(system, i), vec(b.principal_inertia), duration))
+def place_obstacles_ahead(system, asleep, duration, ahead):
+    """Write into ``ahead`` (n,) BODY where obstacles are after ``duration`` [s], and particles that sleep (n,)."""
+    system, asleep, ahead = without_refcounts((system, asleep, ahead))
+    for i in range(len(system.body)):
+        b, then = system.body[i], ahead[i]
+        if i >= system.particles:
+            ahead[i] = b
+            set_pose(then, *place_on_path(path_of_body(system, i), vec(b.principal_inertia), duration))
+        elif asleep[i]:
+            ahead[i] = b
+            then.inverse_mass = 0.0
+            set_vec3(then.inverse_inertia, _STILL)
 
 
 @kernel

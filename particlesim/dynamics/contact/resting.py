@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from particlesim.core.parallel import ThreadTeam
-from particlesim.dynamics.contact.booking import NOTHING_BORNE, Borne
+from particlesim.dynamics.contact.booking import NOTHING_BORNE, Borne, together
 from particlesim.dynamics.contact.clearance import add_displacements, changes_ahead, expected_changes
 from particlesim.dynamics.contact.cone_solver import MOVER
 from particlesim.dynamics.contact.foreseen import unforeseen
@@ -24,8 +24,18 @@ from particlesim.dynamics.contact.island_step import (
     write_obstacles,
 )
 from particlesim.dynamics.contact.lasting_contacts import Motion, Search, contacts_of, new_search, resting_on_obstacles
-from particlesim.dynamics.contact.lasting_islands import forces_after, gathered, warm_start
+from particlesim.dynamics.contact.lasting_islands import forces_after, gathered, mean_forces, warm_start
 from particlesim.dynamics.contact.position_correction import place_obstacles_ahead
+from particlesim.dynamics.contact.sleep import (
+    borne_asleep,
+    disturbed,
+    fall_asleep,
+    held_bodies,
+    kept_forces,
+    note_still,
+    unbalanced,
+    wake,
+)
 from particlesim.dynamics.neighbour_list import NeighbourList
 from particlesim.dynamics.settings import (
     CHANGE_MARGIN,
@@ -34,8 +44,11 @@ from particlesim.dynamics.settings import (
     MAX_CONTACT_SEARCHES,
     PAIR_COST,
     RESTING_SUBSTEPS,
+    SLEEP_SPEED,
     SPEED_GAIN,
     UNRESOLVED_VELOCITY,
+    WAKE_AT_ONCE,
+    WAKE_BALANCE,
 )
 from particlesim.dynamics.solver_state import SolverState
 from particlesim.dynamics.standing import LOOSE, SETTLES
@@ -48,11 +61,12 @@ class RestingContacts:
 
     def __init__(self, system: System) -> None:
         self._system = system
-        self._pull = float(np.linalg.norm(system.domain[0]["gravity"]))  # the largest [m/s^2]
+        self._pull = float(np.linalg.norm(system.domain["gravity"]))  # the largest [m/s^2]
         self.loses = bool(system.law["restitution"].min(initial=1.0) < 1.0)
         self.known = self._pull > 0.0 or self.loses
         self._mover = np.zeros(len(system.body) if self.known else 0, dtype=MOVER)
         self._mover["pull"] = system.domain[0]["gravity"]
+        self._fields = False  # whether anything but gravity acts: then nothing sleeps
         self._fields_until = 0.0
         self._inradius = float(system.body["inradius"][: system.particles].min(initial=np.inf))  # the smallest [m]
         self._ahead = np.zeros_like(self._system.body[: len(self._mover)])  # scratch: at the end of the step
@@ -66,10 +80,13 @@ class RestingContacts:
     def let_fields_act(self, acceleration: np.ndarray, until: float) -> None:
         """Say what fields do to particles (n, 3) [m/s^2], and until when the velocities have it [s]."""
         if self.known:
-            pulls = self._system.domain[0]["gravity"] + acceleration
-            self._mover["pull"][: len(pulls)] = pulls
-            self._pull = float(np.linalg.norm(pulls, axis=1).max(initial=0.0))
-            self._fields_until = until
+            self._set_pulls(self._system.domain["gravity"] + acceleration)
+            self._fields, self._fields_until = True, until
+
+    def _set_pulls(self, pulls: np.ndarray) -> None:
+        """Take over accelerations of particles (n, 3), or of all (1, 3) [m/s^2]."""
+        self._mover["pull"][: self._system.particles] = pulls
+        self._pull = float(np.linalg.norm(pulls, axis=1).max(initial=0.0))
 
     def carry(self, state: SolverState, duration: float) -> Borne:
         """Carry what is in lasting contact through a substep of ``duration`` [s]: its velocity changes."""
@@ -77,38 +94,88 @@ class RestingContacts:
         state.standing[:] = 0
         if not self.known:
             return NOTHING_BORNE
-        system, body, neighbours = self._system, self._system.body, state.neighbours
+        system, body = self._system, self._system.body
+        if not self._fields:
+            self._set_pulls(system.domain["gravity"])
         body["resting"][: system.particles] = 0
-        spin = angular_velocities(body, len(body))
-        change = expected_changes(system, neighbours, spin, duration, SPEED_GAIN * self._pull * duration)
-        seeds = self._seeds(state, Motion(spin, change, duration), self._fields_until - state.time)
+        if state.asleep.any():
+            woken = state.asleep if self._fields else disturbed(system, state)
+            wake(state, woken, 0, len(body))
+        motion = self._motion(state, duration)
+        seeds = self._seeds(state, motion, self._fields_until - state.time)
         if not len(seeds):
             return NOTHING_BORNE
         add_displacements(system, state.seen, state.displacement)
-        write_obstacles(body, self._mover, system.particles)
-        place_obstacles_ahead(system, duration, self._ahead)
-        for attempt in range(1, MAX_CONTACT_SEARCHES + 1):
-            motion = Motion(spin, change, duration)
-            search = new_search(state, len(body))
-            points, terms = self._contacts(neighbours, motion, search, seeds)
-            islands = gathered(points, terms, seeds, system.particles)
-            warm_start(islands, state.forces, len(body))
-            left = self._step(islands, duration, self._fields_until - state.time)
-            carried = np.arange(len(body)) >= system.particles
-            carried[islands.member] = True
-            foreseen = not unforeseen(system, neighbours, motion, search, self._ahead, carried)
-            if foreseen or attempt == MAX_CONTACT_SEARCHES:
-                break
-            found = changes_ahead(system, spin, duration, islands.member, self._ahead)
-            change = np.maximum(CHANGE_MARGIN * change, CHANGE_MARGIN * found)
+        note_still(system, state)
+        islands, search, woken, unresolved = self._solve(state, motion, seeds)
+        body["resting"][: system.particles] = state.asleep
         self._take_over(islands.member)
         state.standing[islands.member] = np.where(search.loose[islands.member] > 0, LOOSE, SETTLES)
+        state.standing[: system.particles][state.asleep] = SETTLES
         state.standing[system.particles :] = SETTLES
-        state.forces = forces_after(islands, len(body))
         self._mark_lasting(state, islands)
+        on_sleepers = islands.terms["impulse"][self._presses(state, islands.points)].sum(axis=0)
+        borne = together(self._borne(islands, unresolved), borne_asleep(system, state, on_sleepers, duration))
+        wake(state, woken, 0, len(body))
+        return borne
+
+    def _motion(self, state: SolverState, duration: float) -> Motion:
+        """How bodies move at the start of a step, and by how much that may change."""
+        system, held = self._system, held_bodies(self._system, state.asleep)
+        spin = angular_velocities(system.body, len(system.body))
+        gain = SPEED_GAIN * self._pull * duration
+        return Motion(spin, expected_changes(system, state.neighbours, spin, held, duration, gain), held, duration)
+
+    def _solve(self, state: SolverState, motion: Motion, seeds: np.ndarray) -> tuple[Islands, Search, np.ndarray, bool]:
+        """Take islands through a step, until nothing meets unforeseen, and none that sleeps should wake at once.
+
+        Returns whom the step wakes (n,), and whether something was left undone, too.
+        """
+        system, neighbours, bodies, duration = self._system, state.neighbours, len(self._mover), motion.duration
+        write_obstacles(system.body, self._mover, state.asleep)
+        place_obstacles_ahead(system, state.asleep, duration, self._ahead)
+        searches = wakes = 0
+        while True:
+            search = new_search(state, bodies)
+            points, terms = self._contacts(neighbours, motion, search, seeds)
+            woken = self._struck(state, points, terms)
+            if not woken.any():
+                islands = gathered(points, terms, seeds, state.asleep)
+                warm_start(islands, state.forces, bodies)
+                left = self._step(islands, duration, self._fields_until - state.time)
+                kept = kept_forces(state.forces, motion.held)
+                means = np.concatenate([kept, mean_forces(islands, bodies, duration)])
+                woken = unbalanced(system, means, motion.held, state.asleep, (WAKE_AT_ONCE, np.inf))
+            if woken.any():
+                wake(state, woken, wakes, bodies)
+                wakes, motion = wakes + 1, self._motion(state, duration)
+                continue
+            searches += 1
+            carried = motion.held.copy()
+            carried[system.particles :] = carried[islands.member] = True
+            foreseen = not unforeseen(system, neighbours, motion, search, self._ahead, carried)
+            if foreseen or searches == MAX_CONTACT_SEARCHES:
+                break
+            found = changes_ahead(system, motion.spin, duration, islands.member, self._ahead)
+            motion = motion._replace(change=np.maximum(CHANGE_MARGIN * motion.change, CHANGE_MARGIN * found))
+        state.forces = np.concatenate([kept, forces_after(islands, bodies)])
         # What is less does not sink in by more than is corrected.
         counts = max(self._pull * duration, CORRECTED_DEPTH * self._inradius * RESTING_SUBSTEPS / duration)
-        return self._borne(islands, not foreseen or left > UNRESOLVED_VELOCITY * counts)
+        woken = unbalanced(system, means, motion.held, state.asleep, (WAKE_BALANCE, SLEEP_SPEED))
+        return islands, search, woken, not foreseen or left > UNRESOLVED_VELOCITY * counts
+
+    def _presses(self, state: SolverState, points: np.ndarray) -> np.ndarray:
+        """Which contact points (m,) are on sleepers."""
+        presses = points["b"] < self._system.particles
+        presses[presses] = state.asleep[points["b"][presses]]
+        return presses
+
+    def _struck(self, state: SolverState, points: np.ndarray, terms: np.ndarray) -> np.ndarray:
+        """Sleepers that something meets fast, or an obstacle that moves, (n,) bool."""
+        struck = np.zeros(len(state.asleep), dtype=np.bool_)
+        fast = self._presses(state, points) & (terms["approach"] < -terms["threshold"])
+        struck[points["b"][fast]] = struck[points["a"]] = True
+        return struck & state.asleep
 
     def _seeds(self, state: SolverState, motion: Motion, until_fields: float) -> np.ndarray:
         """Particles that are in lasting contact to begin with, (k,)."""
@@ -169,10 +236,18 @@ class RestingContacts:
         self._before = body[["velocity", "angular_momentum"]][member]
         take_over(body, member, self._ahead)
 
-    def finish(self) -> None:
-        """Put what was carried where it is at the end of the substep, after it has gone on at its velocity."""
-        if len(self._member):
-            finish(self._system, self._member, self._ahead)
+    def finish(self, state: SolverState) -> Borne:
+        """Put what was carried where it is at the end of the substep, after it has gone on at its velocity.
+
+        What has been still for long falls asleep; returns what that took.
+        """
+        finish(self._system, self._member, self._ahead)
+        if self._fields:
+            return NOTHING_BORNE
+        asleep, borne = fall_asleep(self._system, state, self._member)
+        if asleep.any():
+            add_displacements(self._system, state.seen, state.displacement)
+        return borne
 
     @property
     def carried(self) -> bool:
@@ -191,7 +266,7 @@ class RestingContacts:
     def _mark_lasting(self, state: SolverState, islands: Islands) -> None:
         """Particles that were pushed by what does not rebound in full are in lasting contact."""
         pushed = (islands.terms["pushed"] > 0.0) & (islands.terms["restitution"] < 1.0)
-        state.lasting[:] = 0
+        state.lasting[:] = state.asleep
         for end in ("a", "b"):
             indices = islands.points[end][pushed]
             state.lasting[indices[indices < self._system.particles]] = 1
