@@ -210,14 +210,15 @@ def hills(x, y):
     return 0.25 * np.sin(2.5 * x) * np.cos(2.0 * y) + 0.4 * (x * x + y * y)
 
 
-def heap(count, seed, **settings):
+SHAPES = "sphere", "cube", "tetrahedron", {"kind": "capsule", "length": 1.0}
+
+
+def heap(count, seed, shapes=SHAPES, **settings):
     """Mixed bodies that fall into a hilly bowl without a thickness."""
     bowl = ground(20, 1.6, hills)
     region = {"lower": (-0.8, -0.8, 1.2), "upper": (0.8, 0.8, 3.0)}
-    groups = [
-        {"shape": shape, "count": count, "size": 0.2, "placement": {"kind": "random", "region": region}}
-        for shape in ("sphere", "cube", "tetrahedron", {"kind": "capsule", "length": 1.0})
-    ]
+    placement = {"kind": "random", "region": region}
+    groups = [{"shape": shape, "count": count, "size": 0.2, "placement": placement} for shape in shapes]
     return on(bowl, *groups, size=(8, 8, 8), restitution=0.3, friction=0.4, seed=seed, **settings)
 
 
@@ -278,3 +279,108 @@ def test_a_fast_thin_plate_that_spins_onto_a_sheet_stays_on_its_side():
         sim.run(duration=0.02)
         x, y, z = sim.particles.position.T
         assert (z[(np.abs(x) < 2.9) & (np.abs(y) < 2.9)] > -1e-3).all()
+
+
+# ---- sleep -----------------------------------------------------------------------------------------------------------
+
+
+def asleep(sim):
+    """Which particles sleep, (n,)."""
+    return sim._solver.state.asleep
+
+
+def closed(sim):
+    """What energy, dissipation and work add up to [J]: always the same."""
+    return sim.ledger.energy + sim.ledger.dissipated.sum() - sim.ledger.work
+
+
+@pytest.fixture(scope="module")
+def sleepers(tmp_path_factory):
+    """A heap asleep in a bowl of triangles, as a file; nothing in it rolls for ever."""
+    sim = heap(3, 5, shapes=("cube", "tetrahedron"))
+    begin = closed(sim)
+    sim.run(duration=6.0)
+    assert asleep(sim).all()
+    assert closed(sim) == pytest.approx(begin, rel=1e-12)
+    path = tmp_path_factory.mktemp("bowl") / "asleep.ckpt"
+    sim.save(path)
+    return path
+
+
+def test_a_heap_asleep_on_a_mesh_does_not_move_by_a_bit(sleepers):
+    sim = Simulation.load(sleepers)
+    start, poses = sim.ledger, (sim.particles.position.tobytes(), sim.particles.orientation.tobytes())
+    sim.run(duration=30.0)
+    assert (sim.particles.position.tobytes(), sim.particles.orientation.tobytes()) == poses
+    assert sim.ledger.energy == start.energy
+    assert sim.largest_overlap() < 1e-4 * 0.2
+
+
+def test_what_is_struck_in_a_heap_asleep_on_a_mesh_wakes(sleepers, tmp_path):
+    """It goes on from there, the same whatever the threads and the broad phase, and gains nothing."""
+    one = Simulation.load(sleepers)
+    one.particles.velocity[one.particles.position[:, 2].argmax()] = (0.5, 0.3, 1.5)
+    begin = closed(one)
+    one.run(duration=0.2)
+    assert not asleep(one).all()
+    one.save(tmp_path / "half.ckpt")
+    two = Simulation.load(tmp_path / "half.ckpt", broad_phase="naive", threads=2)
+    for sim in (one, two):
+        sim.run(duration=0.5)
+        assert closed(sim) == pytest.approx(begin, rel=1e-12)
+        assert (sim.particles.position[:, 2] > hills(*sim.particles.position[:, :2].T) - 1e-3).all()
+    assert one.state_hash() == two.state_hash()
+    one.run(duration=5.0)
+    assert asleep(one).all()
+
+
+def setting_off(speed, at):
+    """The floor, which goes at a velocity from a time on [s]."""
+    return Obstacle(FLOOR, (0, 0, 0), pieces=(Piece(0.0, (0, 0, 0)), Piece(at, (0, 0, 0), velocity=speed)))
+
+
+def test_a_mesh_that_goes_up_takes_along_what_sleeps_on_it():
+    """It works m g v, and what lies on it goes as fast."""
+    stack = listed("cube", lying(), lying(1.5), mass=2.0)
+    sim = on(setting_off((0, 0, 0.5), 2.0), stack, friction=0.5)
+    sim.run(duration=2.0)
+    assert asleep(sim).all()
+    before = sim.particles.position.copy()
+    sim.run(duration=0.1)
+    assert not asleep(sim).any()
+    work = sim.ledger.work
+    sim.run(duration=1.0)
+    assert sim.particles.position - before == pytest.approx(np.tile([0, 0, 0.55], (2, 1)), abs=2e-3)
+    assert sim.ledger.work - work == pytest.approx(4.0 * G * 0.5, rel=1e-6)
+
+
+def test_a_mesh_that_slides_away_drags_what_sleeps_on_it():
+    """It slips with mu g until it is as fast, after v / (mu g)."""
+    speed, friction = 1.0, 0.5
+    sim = on(setting_off((speed, 0, 0), 2.0), listed("cube", lying()), friction=friction)
+    sim.run(duration=2.0)
+    assert asleep(sim).all()
+    before = sim.particles.position[0].copy()
+    sim.run(duration=1.0)
+    gone = speed * (1.0 - 0.5 * speed / (friction * G))
+    assert sim.particles.velocity[0] == pytest.approx((speed, 0, 0), abs=1e-6)
+    assert sim.particles.position[0] - before == pytest.approx((gone, 0, 0), abs=2e-3)
+
+
+def test_a_mesh_that_comes_up_through_a_hole_wakes_what_it_reaches():
+    sides = trimesh.util.concatenate(
+        [trimesh.creation.box((1, 4, 1)).apply_translation((x, 0, -0.5)) for x in (-0.8, 0.8)]
+    )
+    start = (0, 0, -0.5)
+    rises = Piece(0.0, start), Piece(2.0, start, velocity=(0, 0, 0.5))
+    obstacles = [
+        Obstacle(triangle_mesh("sides", sides.vertices, sides.faces), (0, 0, 0)),
+        Obstacle(ground(2, 0.2), start, pieces=rises),
+    ]
+    what = scene(listed("cube", {"position": (0, 0, 0.5)}), boundary="open", gravity=(0, 0, -G), restitution=0.0)
+    sim = Simulation.of_model(what, build(what, [o._replace(material=Material(restitution=0.0)) for o in obstacles]))
+    sim.run(duration=2.9)
+    assert asleep(sim).all() and sim.particles.position[0, 2] == pytest.approx(0.5, abs=1e-3)
+    sim.run(duration=1.1)
+    assert sim.particles.position[0] == pytest.approx((0, 0, 1.0), abs=1e-3)
+    assert sim.particles.velocity[0] == pytest.approx((0, 0, 0.5), abs=1e-6)
