@@ -34,7 +34,7 @@ from particlesim.model.system import System
 _OTHERS, _VIRIAL, _ROWS = len(WALL_NAMES), len(WALL_NAMES) + 1, len(WALL_NAMES) + 2
 
 
-# ---- who -------------------------------------------------------------------------------------------------------------
+# ---- which -----------------------------------------------------------------------------------------------------------
 
 
 def held_bodies(system: System, asleep: np.ndarray) -> np.ndarray:
@@ -68,19 +68,19 @@ def _stirs(system, i, speed):
 
 
 @entry_kernel
-def unbalanced(system, forces, held, who, limits):
-    """Those of particles ``who`` (n,) that weight and ``forces`` (k,) FORCE do not leave where they are, (n,) bool.
+def unbalanced(system, forces, held, chosen, limits):
+    """Those of particles ``chosen`` (n,) that weight and ``forces`` (k,) FORCE do not leave where they are, (n,) bool.
 
     ``limits`` are the part of what friction can hold up to which they do, and how fast particles that are not held may
     be that touch them (see ``_stirs``). No obstacle may that is not held.
     """
-    system, forces, held, who = without_refcounts((system, forces, held, who))
+    system, forces, held, chosen = without_refcounts((system, forces, held, chosen))
     bodies, gravity, period = len(system.body), vec(system.domain[0].gravity), system.domain[0].period
     total, found = np.zeros((system.particles, 7)), np.zeros(system.particles, dtype=np.bool_)
     share, speed = limits
     for k in range(len(forces)):
         i, j = forces[k].contact // bodies, forces[k].contact % bodies
-        of_i, of_j = who[i], j < system.particles and who[j]
+        of_i, of_j = chosen[i], j < system.particles and chosen[j]
         if not (of_i or of_j):
             continue
         a, b = system.body[i], system.body[j]
@@ -94,7 +94,7 @@ def unbalanced(system, forces, held, who, limits):
             _add_wrench(total[j], force, add(cross(arm_b, force), torque), hold)
             found[j] |= not held[i] and _stirs(system, i, speed)
     for i in range(system.particles):
-        if who[i]:
+        if chosen[i]:
             b, row = system.body[i], total[i]
             weight = scale(gravity, b.mass)
             most = max(share * row[6], SLEEP_LEAST_BALANCE * norm(weight))
