@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from particlesim.cli.errors import fail
+from particlesim.cli.render_options import frames_asked
 from particlesim.cli.tables import print_summary
 from particlesim.core.constants import MOVIE_ENDINGS
 
 if TYPE_CHECKING:
     from particlesim.jobs.summary import Summary
     from particlesim.scene import Scene
+    from particlesim.trajectory.gsd_file import Trajectory
 
 
 def load(source: Path) -> Scene:
@@ -25,6 +28,20 @@ def load(source: Path) -> Scene:
     if source.suffix.lower() == ".gsd":
         raise SceneError("must be a scene file (TOML)", file=source)
     return load_scene(source)
+
+
+@contextmanager
+def run_asked(source: Path, frames: str | None, every: str | None) -> Iterator[tuple[Scene | Trajectory, range]]:
+    """The scene or the trajectory of a file, and the numbers of the frames asked for.
+
+    SceneError or TrajectoryError if it cannot be read, OptionError for frames that there are not.
+    """
+    subject = source if source.suffix.lower() == ".gsd" else load(source)
+    from particlesim.jobs.frame_source import opened  # noqa: PLC0415
+    from particlesim.scene import Scene  # noqa: PLC0415
+
+    with opened(subject) as run:
+        yield run, frames_asked(run.frames if isinstance(run, Scene) else len(run), frames, every)
 
 
 def make_file(

@@ -10,8 +10,7 @@ import typer
 from particlesim.cli.errors import one_line_errors
 from particlesim.cli.options import Every, Quiet, SomeFrames, Threads
 from particlesim.cli.output import place_for
-from particlesim.cli.render_options import frames_asked
-from particlesim.cli.run import load
+from particlesim.cli.run import run_asked
 
 
 def view(
@@ -31,13 +30,9 @@ def view(
     with one_line_errors(source), place_for(output, source, ".html") as path:
         from particlesim.cli.progress import shown_progress  # noqa: PLC0415
 
-        subject = source if source.suffix.lower() == ".gsd" else load(source)
-        from particlesim.jobs import view as job  # noqa: PLC0415
-        from particlesim.jobs.frame_source import opened  # noqa: PLC0415
-        from particlesim.scene import Scene  # noqa: PLC0415
+        with run_asked(source, frames, every) as (run, chosen), shown_progress(quiet) as progress:
+            from particlesim.jobs import view as job  # noqa: PLC0415
 
-        with opened(subject) as run, shown_progress(quiet) as progress:
-            chosen = frames_asked(run.frames if isinstance(run, Scene) else len(run), frames, every)
             job.view(run, path, frames=chosen, progress=progress, threads=threads)
     if not quiet:
         print(path)

@@ -9,7 +9,7 @@ from particlesim.core.arguments import checked_arguments
 from particlesim.core.atomic_write import atomic_write
 from particlesim.core.output_path import check_output
 from particlesim.jobs.compiling import compile_kernels
-from particlesim.jobs.frame_source import Progress, frame_source, frames_ahead, opened, tell
+from particlesim.jobs.frame_source import Progress, frame_source, frames_ahead, opened, told
 from particlesim.rendering.shading.colour import ParticleColours
 from particlesim.rendering.shading.fields import is_settled_by_frames
 from particlesim.rendering.web.page import check_size, page
@@ -79,12 +79,7 @@ def view(
         if is_settled_by_frames(chosen.scene):
             coming, sample = frames_ahead(chosen, coming, progress, 0)
         colours = ParticleColours(chosen.scene, chosen.header, sample)
-        shown = []
-        for number, frame in coming:
-            if frame is not None:
-                tell(progress, chosen.phase, number + 1, chosen.total)
-                if number in chosen.wanted:
-                    shown.append(frame)
+        shown = list(told(chosen._replace(frames=coming), progress))
         made = Page(page(chosen.scene, chosen.header, chosen.first, shown, colours), len(shown))
     if path is not None:
         with atomic_write(path) as hidden:
