@@ -18,14 +18,14 @@ def spoilt(monkeypatch):
     """Lets particles be changed by a function at the time AT."""
 
     def spoil(change):
-        step = Simulation.step
+        step = Simulation._step
 
         def spoiling(simulation, *arguments):
             step(simulation, *arguments)
             if simulation.time >= AT and len(simulation.particles.mass) > 3:  # not what is simulated to compile kernels
                 change(simulation.particles)
 
-        monkeypatch.setattr(Simulation, "step", spoiling)
+        monkeypatch.setattr(Simulation, "_step", spoiling)
 
     return spoil
 

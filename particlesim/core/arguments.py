@@ -63,9 +63,10 @@ def checked_arguments(function: Callable[_Given, _Result]) -> Callable[_Given, _
             given = signature.bind(*args, **kwargs).arguments
         except TypeError as error:
             raise TypeError(f"{called}: {error}") from None
+        known = kinds()
         for name, value in given.items():
-            if name in kinds():
-                _check(f"{called}: {name}", value, kinds()[name])
+            if name in known:
+                _check(f"{called}: {name}", value, known[name])
         return function(*args, **kwargs)
 
     return checked

@@ -149,7 +149,7 @@ class Simulation:
             if not 0 <= steps <= MOST_STEPS:
                 raise ValueError(f"steps must be a whole number from 0 to {MOST_STEPS:.0e}, not {shown(steps)}")
             for _ in range(steps):
-                self.step()
+                self._step(self.next_time_step())
             return
         seconds = float(duration or 0.0)
         if not 0.0 <= seconds < math.inf:
@@ -178,7 +178,7 @@ class Simulation:
 
     def _run_until(self, end: float) -> None:
         while self.time < end:
-            self.step_towards(end)
+            self._step_towards(end)
 
     def _check_end(self, left: float, name: str, value: float) -> None:
         """ValueError, which names an argument and its value, for what it takes years to come to."""
@@ -196,8 +196,12 @@ class Simulation:
         left = end - self.time
         if not 0.0 < left < math.inf:
             raise ValueError(f"end = {end:g} s is not after the present, {self.time:g} s")
+        self._step_towards(end)
+
+    def _step_towards(self, end: float) -> None:
+        left = end - self.time
         parts = math.ceil(left / self.next_time_step() - 1e-9)
-        self.step(left / max(parts, 1))
+        self._step(left / max(parts, 1))
         if parts <= 1:
             self._solver.state.time = end
 
@@ -220,9 +224,12 @@ class Simulation:
         """
         if time_step is not None and not 0.0 < time_step < math.inf:
             raise ValueError(f"time_step must be a finite number of seconds above 0, not {time_step!r}")
+        self._step(self.next_time_step() if time_step is None else time_step)
+
+    def _step(self, time_step: float) -> None:
         with limit_threads(self._threads):
-            self.time_step = self.next_time_step() if time_step is None else time_step
-            self._solver.step(self.time_step)
+            self.time_step = time_step
+            self._solver.step(time_step)
             changed = self._flow.exchange(self.model, self.time)
             if changed is not None:
                 self._solver.change_particles(*changed)
