@@ -129,7 +129,7 @@ class RestingContacts:
     def _solve(self, state: SolverState, motion: Motion, seeds: np.ndarray) -> tuple[Islands, Search, np.ndarray, bool]:
         """Take islands through a step, until nothing meets unforeseen, and none that sleeps should wake at once.
 
-        Returns whom the step wakes (n,), and whether something was left undone, too.
+        Returns which particles the step wakes (n,), and whether something was left undone, too.
         """
         system, neighbours, bodies, duration = self._system, state.neighbours, len(self._mover), motion.duration
         write_obstacles(system.body, self._mover, state.asleep)

@@ -172,7 +172,7 @@ def fall_asleep(system: System, state: SolverState, members: np.ndarray) -> tupl
 def _borne_forces(system, forces, asleep):
     """What the ``forces`` (k,) FORCE that sleepers are held by come to, (rows, 4): vectors [N], the virial [J].
 
-    The last column is the sum of all forces on each wall, whomever they hold [N].
+    The last column is the sum of all forces on each wall, whatever is held [N].
     """
     system, forces, asleep = without_refcounts((system, forces, asleep))
     bodies, period = len(system.body), system.domain[0].period
@@ -197,7 +197,7 @@ def kept_forces(forces: np.ndarray, held: np.ndarray) -> np.ndarray:
 
 
 def borne_asleep(system: System, state: SolverState, pushed: np.ndarray, duration: float) -> Borne:
-    """What sleepers hand on in a step [s] to whom others give an impulse ``pushed`` (3,) in all [N s]."""
+    """What sleepers hand on in a step [s], given an impulse ``pushed`` (3,) in all by others [N s]."""
     if not state.asleep.any():
         return NOTHING_BORNE
     total = _borne_forces(system, state.forces, state.asleep) * duration
