@@ -14,9 +14,8 @@ from particlesim.setup.build import build
 from particlesim.setup.obstacles import Obstacle, Piece
 from particlesim.simulation.simulation import Simulation
 from tests.meshes import ground
+from tests.sleepers import G, asleep, check_taken_along
 from tests.worlds import listed, scene
-
-G = 9.81
 
 # Some 40 triangles lie beneath a cube.
 FLOOR = ground(25, 5.0)
@@ -284,11 +283,6 @@ def test_a_fast_thin_plate_that_spins_onto_a_sheet_stays_on_its_side():
 # ---- sleep -----------------------------------------------------------------------------------------------------------
 
 
-def asleep(sim):
-    """Which particles sleep, (n,)."""
-    return sim._solver.state.asleep
-
-
 def closed(sim):
     """What energy, dissipation and work add up to [J]: always the same."""
     return sim.ledger.energy + sim.ledger.dissipated.sum() - sim.ledger.work
@@ -344,14 +338,7 @@ def test_a_mesh_that_goes_up_takes_along_what_sleeps_on_it():
     stack = listed("cube", lying(), lying(1.5), mass=2.0)
     sim = on(setting_off((0, 0, 0.5), 2.0), stack, friction=0.5)
     sim.run(duration=2.0)
-    assert asleep(sim).all()
-    before = sim.particles.position.copy()
-    sim.run(duration=0.1)
-    assert not asleep(sim).any()
-    work = sim.ledger.work
-    sim.run(duration=1.0)
-    assert sim.particles.position - before == pytest.approx(np.tile([0, 0, 0.55], (2, 1)), abs=2e-3)
-    assert sim.ledger.work - work == pytest.approx(4.0 * G * 0.5, rel=1e-6)
+    check_taken_along(sim, 0.5)
 
 
 def test_a_mesh_that_slides_away_drags_what_sleeps_on_it():

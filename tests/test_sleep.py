@@ -7,17 +7,12 @@ import pytest
 
 import particlesim as ps
 from particlesim.dynamics.contact.lasting_islands import forces_of
+from tests.sleepers import G, asleep, check_taken_along
 from tests.worlds import listed, scene
 
-G = 9.81
 GRAVITY = (0.0, 0.0, -G)
 FLOOR = {"shape": {"kind": "box", "edges": [40.0, 40.0, 1.0]}, "position": [0, 0, -0.5]}
 SHAPES = "sphere", "cube", "tetrahedron"
-
-
-def asleep(sim):
-    """Which particles sleep, (n,)."""
-    return sim._solver.state.asleep
 
 
 def standing(*bodies, **settings):
@@ -152,15 +147,7 @@ def test_a_plate_that_begins_to_move_takes_along_what_sleeps_on_it():
     poses = [{"position": (0, 0, 0.5 + k)} for k in range(3)]
     sim = standing(listed("cube", *poses, mass=2.0), obstacles=[{**FLOOR, "motion": motion}], friction=0.5)
     sim.run(duration=until)
-    assert asleep(sim).all()
-    before = sim.particles.position.copy()
-    sim.run(duration=0.1)
-    assert not asleep(sim).any()
-    work = sim.ledger.work
-    sim.run(duration=1.0)
-    assert sim.particles.position - before == pytest.approx(np.tile([0, 0, 1.1 * speed], (3, 1)), abs=2e-3)
-    assert sim.particles.velocity == pytest.approx(np.tile([0, 0, speed], (3, 1)), abs=1e-6)
-    assert sim.ledger.work - work == pytest.approx(6.0 * G * speed, rel=1e-6)
+    check_taken_along(sim, speed)
 
 
 def test_a_plate_that_comes_up_from_below_wakes_what_it_reaches():
