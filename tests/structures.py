@@ -124,8 +124,8 @@ def _spare_weight(thickness: float, friction: float, stones: int) -> float:
 def house_of_cards(floors: int, friction: float, lean: float = math.radians(20.0)) -> Scene:
     """Pairs of cards that lean on each other, ``lean`` [rad] from upright, with level cards between their floors."""
     _, thickness, length = CARD
-    # Two edges exactly on each other have a fan of normals; those that are a little apart have one.
-    reach = 0.5 * (length * math.sin(lean) + thickness * math.cos(lean)) + 1e-8
+    # The upper edges of a pair are exactly on each other: of their fan of normals the one in the middle is level.
+    reach = 0.5 * (length * math.sin(lean) + thickness * math.cos(lean))
     rise = 0.5 * (length * math.cos(lean) + thickness * math.sin(lean))
     apart = 4.0 * reach + 0.002
     poses, floor = [], -0.5

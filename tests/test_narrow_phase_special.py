@@ -120,6 +120,34 @@ class TestEdgesAndCorners:
         check(meet(plate, plate, (1 + gap, 0, 0), tilt=tilt), gap, (1, 0, 0), side)
 
 
+@pytest.mark.parametrize("tilt", TILTS)
+class TestWhatHasAFanOfNormals:
+    """Where edges or corners touch exactly, many directions part them: the one in the middle is as they are."""
+
+    def expect(self, found, normal):
+        assert found[0] == pytest.approx(0.0, abs=1e-14)
+        np.testing.assert_allclose(found[1], np.asarray(normal) / np.linalg.norm(normal), atol=1e-14)
+
+    def test_an_edge_along_an_edge(self, tilt):
+        self.expect(meet("cube", "cube", (1.0, 0.2, 1.0), tilt=tilt), (1, 0, 1))
+
+    def test_one_cube_upright_on_the_edge_of_another(self, tilt):
+        on_edge = about((0, 1, 0), 45)
+        self.expect(meet("cube", "cube", (0, 0, sqrt(2.0)), turn_a=on_edge, turn_b=on_edge, tilt=tilt), (0, 0, 1))
+
+    def test_a_corner_on_a_corner(self, tilt):
+        self.expect(meet("cube", "cube", (1.0, 1.0, 1.0), tilt=tilt), (1, 1, 1))
+
+    def test_a_tip_on_a_tip(self, tilt):
+        self.expect(meet("pyramid", "pyramid", (0, 0, 1.5), turn_b=about((0, 1, 0), 180), tilt=tilt), (0, 0, 1))
+
+    def test_a_tip_on_an_edge(self, tilt):
+        corner = np.array([0.5, 0.1, 0.5])
+        tip = corner + 0.75 * np.array([0.6, 0.0, 0.8])
+        turn = about((0, 1, 0), 180 + np.degrees(np.arctan2(0.6, 0.8)))
+        self.expect(meet("cube", "pyramid", tip, turn_b=turn, tilt=tilt), (1, 0, 1))
+
+
 def test_a_short_edge_that_is_tilted_touches_with_its_end_alone():
     # The end of a rod, 0.001 wide and tilted by 1e-4: its corners differ in height by a ten-millionth of its length.
     turn = oracles.product(about((0, 1, 0), 90 + np.degrees(1e-4)), about((1, 0, 0), 20))

@@ -27,7 +27,7 @@ from particlesim.core.math3d import (
 )
 from particlesim.geometry.narrow_phase.expanding_polytope import expanded_depth
 from particlesim.geometry.support import bounding_radius, farthest_row, has_faces, vertex_position
-from particlesim.geometry.tolerances import FACE_FIRST, MANY_EDGE_PAIRS, PARALLEL_EDGES
+from particlesim.geometry.tolerances import FACE_FIRST, JOINED, MANY_EDGE_PAIRS, PARALLEL_EDGES
 
 _NOWHERE = (0.0, 0.0, 0.0)
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -63,10 +63,12 @@ def _normals_at(table, body):
 
 
 @kernel
-def _best_face(table, shape, vertices, normals, others):
+def _best_face(table, shape, vertices, normals, others, touching):
     """The face of a core from whose plane ``others`` stick out farthest, by their nearest point: (separation, normal).
 
     ``vertices`` and ``normals`` are those of the core in the same frame as ``others``. Of no faces: minus infinity.
+    The normal is the sum of those of all faces whose planes ``others`` reach within ``touching``, if any: where edges
+    or corners touch, each is as good as another.
     """
     record = table.shape[shape]
     best, best_normal = -math.inf, _NOWHERE
@@ -75,9 +77,23 @@ def _best_face(table, shape, vertices, normals, others):
         corner = table.loop[table.face[record.first_face + f].first] - record.first_vertex
         nearest = farthest_row(others, 0, len(others), scale(n, -1.0))
         separation = dot(n, load_vec3(others, nearest)) - dot(n, load_vec3(vertices, corner))
-        if separation > best:
+        if max(abs(separation), abs(best)) <= touching:
+            best, best_normal = max(separation, best), add(best_normal, n)
+        elif separation > best:
             best, best_normal = separation, n
     return best, best_normal
+
+
+@kernel
+def _joint_normal(u, v):
+    """The unit vector along u - v, or along ``u`` if ``v`` is parallel to it: faces lie on each other.
+
+    A unit vector stays what it is to the last bit.
+    """
+    if norm(cross(u, v)) > PARALLEL_EDGES * norm(u) * norm(v):
+        u = sub(u, v)
+    length = norm(u)
+    return u if abs(length - 1.0) < 1e-15 else scale(u, 1.0 / length)
 
 
 @kernel
@@ -162,16 +178,19 @@ def _polyhedron_depth(table, a, b, offset):
         _vertices_at(table, turned_b, mat_transposed_vec(a[2], offset)),
         _normals_at(table, turned_b),
     )
-    separation, normal = _best_face(table, a[0], vertices_a, normals_a, vertices_b)
-    of_b, normal_b = _best_face(table, b[0], vertices_b, normals_b, vertices_a)
-    if of_b > separation:
-        separation, normal = of_b, scale(normal_b, -1.0)
+    sizes = bounding_radius(table, a) + bounding_radius(table, b)
+    separation, normal = _best_face(table, a[0], vertices_a, normals_a, vertices_b, JOINED * sizes)
+    of_b, normal_b = _best_face(table, b[0], vertices_b, normals_b, vertices_a, JOINED * sizes)
+    better, other = (normal, normal_b) if separation >= of_b else (scale(normal_b, -1.0), scale(normal, -1.0))
+    if max(abs(separation), abs(of_b)) > JOINED * sizes:
+        other = _NOWHERE
+    separation, normal = max(separation, of_b), _joint_normal(better, other)
     of_edges, edge_normal = -math.inf, normal
     if len(vertices_b) == 2:
         of_edges, edge_normal = _best_edge_of_segment(table, a[0], vertices_a, normals_a, vertices_b)
     else:
         of_edges, edge_normal = _best_edge_pair(table, a[0], b[0], vertices_a, normals_a, vertices_b, normals_b)
-    if of_edges > separation + FACE_FIRST * (bounding_radius(table, a) + bounding_radius(table, b)):
+    if of_edges > separation + FACE_FIRST * sizes:
         separation, normal = of_edges, edge_normal
     return separation, mat_vec(a[2], normal)
 
@@ -212,13 +231,6 @@ def _thin_depth(table, a, b, offset):
 
 
 @kernel
-def _edge_pairs(table, shape_a, shape_b):
-    """How many pairs of edges two cores have, about: with a point each edge is a pair as well."""
-    a, b = table.shape[shape_a], table.shape[shape_b]
-    return (a.last_edge - a.first_edge + 1) * (b.last_edge - b.first_edge + 1)
-
-
-@kernel
 def core_depth(table, a, b, offset):
     """Separation of two cores along the best axis, and that axis, from a to b in world axes.
 
@@ -226,7 +238,10 @@ def core_depth(table, a, b, offset):
     Negative: the exact penetration depth, the shortest shift that parts the cores. Positive: a lower bound of the
     distance.
     """
-    if _edge_pairs(table, a[0], b[0]) >= MANY_EDGE_PAIRS:
+    shape_a, shape_b = table.shape[a[0]], table.shape[b[0]]
+    # About: with a point each edge is a pair as well.
+    edge_pairs = (shape_a.last_edge - shape_a.first_edge + 1) * (shape_b.last_edge - shape_b.first_edge + 1)
+    if edge_pairs >= MANY_EDGE_PAIRS:
         separation, normal, proven = expanded_depth(table, a, b, offset)
         if proven:
             return separation, normal
