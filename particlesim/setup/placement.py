@@ -283,8 +283,7 @@ class Trials:
         lower, upper = self._bounds = _bounds(where.region, world)
         # A particle stays within its region, but where a region spans a periodic world only its centre does.
         self._free = (world.period > 0.0) & (lower <= world.lower) & (upper >= world.upper)
-        self._lower = lower - np.where(self._free, 0.0, extent[0])
-        self._upper = upper - np.where(self._free, 0.0, extent[1])
+        self._extent = extent
         self._centres = np.zeros((0, 3))
         if isinstance(where, ClusterPlacement):
             self._centres = _centres(key, where, (lower, upper), int(members.max()) + 1, random)
@@ -293,7 +292,7 @@ class Trials:
 
     def draw(self, indices: np.ndarray) -> np.ndarray:
         """A position for each particle of ``indices`` (m,), (m, 3)."""
-        lower, upper = self._lower[indices], self._upper[indices]
+        lower, upper = self._bounds_of(indices)
         if (lower > upper).any():
             raise SceneError(self._too_large, self._key)
         points = self._proposed(indices, lower, upper)
@@ -310,7 +309,7 @@ class Trials:
 
     def bring_back(self, points: np.ndarray) -> np.ndarray:
         """Positions (m, 3) of the members, or the nearest to them where they may be."""
-        back = self._cut_off(points, self._lower[self.members], self._upper[self.members])
+        back = self._cut_off(points, *self._bounds_of(self.members))
         return back if _is_round(self._where.region) else np.where(self._free, points, back)
 
     def fill(self, position: np.ndarray, volume: np.ndarray) -> float:
@@ -320,6 +319,11 @@ class Trials:
         if _is_round(self._where.region):
             inside, room = from_middle(position, lower, upper) <= 1.0, room * np.pi / 6.0
         return float(volume[inside].sum() / room)
+
+    def _bounds_of(self, indices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Corners of the boxes that centroids of particles ``indices`` (m,) may be in, (m, 3) each [m]."""
+        below, above = (np.where(self._free, 0.0, extent[indices]) for extent in self._extent)
+        return self._bounds[0] - below, self._bounds[1] - above
 
     def _cut_off(self, points: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
         """Points (m, 3), those outside moved to where the region ends."""
