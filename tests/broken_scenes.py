@@ -8,6 +8,7 @@ from tests.scene_texts import (
     COUNT,
     GOOD,
     GROUP,
+    KEPT,
     NARROW,
     PIXELS,
     RANGE,
@@ -236,6 +237,17 @@ BROKEN = [
     (
         path_of("{ time = 1, position = [1, 0, 0] }", "{ time = 1, position = [1, 0, 0] }"),
         "camera.keys: times must grow from key to key, but 1 follows 1",
+    ),
+    (GOOD + "[trajectory]\nevery = 0\n", "trajectory.every = 0: must be a whole number from 1 to 1,000,000"),
+    (GOOD + "[trajectory]\nfields = []\n", f"trajectory.fields = []: {KEPT}"),
+    (GOOD + '[trajectory]\nfields = "all"\n', f'trajectory.fields = "all": {KEPT}'),
+    (
+        GOOD + '[trajectory]\nfields = ["position", "velocty"]\n',
+        f'trajectory.fields = ["position", "velocty"]: {KEPT}; did you mean \'velocity\'?',
+    ),
+    (
+        GOOD + '[trajectory]\nprecision = "half"\n',
+        "trajectory.precision = \"half\": must be 'single' or 'double'",
     ),
     (GOOD + "[show]\nreadout = 1\n", f"show.readout = 1: {ROWS}"),
     (

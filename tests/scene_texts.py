@@ -5,7 +5,8 @@ WORLD = "[world]\nsize = [4.0, 4.0, 4.0]\n"
 GROUP = '[[particles]]\nshape = "sphere"\ncount = 10\nsize = 0.2\n'
 GOOD = WORLD + GROUP
 ALL_KEYS = (
-    "title, seed, duration, world, particles, emitters, sinks, obstacles, fields, contact, solver, movie, camera, show"
+    "title, seed, duration, world, particles, emitters, sinks, obstacles, fields, contact, solver, trajectory, movie, "
+    "camera, show"
 )
 VECTOR = "must be a list of 3 finite numbers, [x, y, z]"
 COUNT = "must be a whole number from 0 to 100,000,000"
@@ -13,6 +14,10 @@ SIZE = 'must be a number above 0, or a table such as { kind = "uniform", low = 0
 BOUNDARY = "must be 'wall', 'periodic' or 'open', or a list of 3 of them"
 TURN = "[w, x, y, z] (a quaternion), or { axis = [x, y, z], angle = degrees }"
 COLOUR = "must be 'by_shape', 'by_group', 'by_speed', 'by_height', 'by_size', 'by_impacts', a colour name such as 'steelblue', or '#rrggbb'"
+KEPT = (
+    "must be a list of 'position', 'orientation', 'velocity', 'angular_momentum', 'image' or 'impacts', "
+    "'position' among them"
+)
 ROWS = (
     "must be true, false or a list of 'time', 'particles', 'impacts', 'energy change', 'dissipation', 'temperature', 'pressure', "
     "'speed', 'pairs tested' or 'broad phases'"

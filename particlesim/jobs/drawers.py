@@ -23,8 +23,10 @@ from particlesim.trajectory.frames import Frame
 # Drawers at most: more are faster than pictures are encoded. What is left of the cores they share within pictures.
 _MOST = 4
 
-# Pictures in work or waiting, for each drawer: enough that none waits for the next frame, few enough in memory.
+# Pictures in work or waiting, for each drawer: enough that none waits for the next frame; fewer, but one, where more
+# of their frames would take too much memory [bytes].
 _AHEAD = 2
+_MEMORY = 2**30
 
 
 class Drawers:
@@ -65,7 +67,7 @@ class Drawers:
         for number, (frame, history) in enumerate(frames):
             drawer = number % len(self._pools)
             self.waiting.append(self._pools[drawer].submit(self._draw, drawer, frame, history))
-            if len(self.waiting) > _AHEAD * len(self._pools):
+            while len(self.waiting) > min(_AHEAD * len(self._pools), max(1, _MEMORY // max(frame.nbytes, 1))):
                 yield self._next()
         while self.waiting:
             yield self._next()

@@ -10,6 +10,7 @@ from particlesim.core.constants import EXPORT_ENDINGS
 from particlesim.core.output_path import check_output
 from particlesim.jobs.compiling import compile_kernels
 from particlesim.jobs.frame_source import Progress, frame_source, opened, told
+from particlesim.jobs.kept import Uses, check_kept, uses_of_shapes
 from particlesim.rendering.shading.colour import fixed_colours
 from particlesim.scene import Scene
 from particlesim.trajectory.export import Exported
@@ -71,6 +72,18 @@ def export(
     with opened(source) as movable:
         if isinstance(movable, Scene):
             compile_kernels(movable, None, progress)
+        else:
+            check_kept(movable, _uses(movable.scene, suffix))
         chosen = frame_source(movable, frames, threads, progress)
         colours = fixed_colours(chosen.scene, chosen.header)
         return _WRITERS[suffix](path, Exported(chosen.scene, chosen.header, told(chosen, progress), colours))
+
+
+def _uses(scene: Scene, suffix: str) -> Uses:
+    """What a format needs to be of any use; what else is not known is not a number in it."""
+    uses = uses_of_shapes(scene)
+    if suffix == ".usda":
+        uses |= {"velocity": "USD", "orientation": "USD"}
+    if suffix == ".glb" and any(scene.world.period):
+        uses |= {"image": "glTF of a periodic world"}
+    return uses

@@ -24,6 +24,9 @@ from particlesim.trajectory.gsd_file import Trajectory
 _AHEAD = 2**28
 _SPREAD = 33
 
+# Particles of a stored frame that are looked at for it: what few go beyond is told by these.
+_LOOKED_AT = 250_000
+
 # Called with what is going on, how many frames are done, and how many there will be.
 Progress = Callable[[str, int, int], None]
 
@@ -62,11 +65,10 @@ def frames_ahead(
     """
     if source.trajectory is not None:
         stored = source.trajectory
-        return frames, [stored[k] for k in _spread_over(len(stored))]
-    size = sum(value.nbytes for value in vars(source.first).values() if isinstance(value, np.ndarray))
+        return frames, [stored[k].some(_LOOKED_AT) for k in _spread_over(len(stored))]
     whole = ((number, frame) for number, frame in frames if frame is not None)
     held = []
-    for number, frame in itertools.islice(whole, max(1, _AHEAD // max(size, 1))):
+    for number, frame in itertools.islice(whole, max(1, _AHEAD // max(source.first.nbytes, 1))):
         held.append((number, frame))
         tell(progress, source.phase, number + 1, source.total)
     sample = [held[k][1] for k in _spread_over(len(held))]
@@ -127,6 +129,7 @@ def frame_source(
     simulation = start(source, threads, progress)
     header, first = simulation.header, simulation.frame()
     if run is not None and run.state:
+        del simulation  # there may be no memory for two
         simulation = Simulation.load(run.state, threads=threads)
     total = max(wanted) + 1
     frames = frames_of(simulation, first, total, kept if run is not None and run.state else 0)
@@ -175,6 +178,7 @@ def frames_of(simulation: Simulation, first: Frame, total: int, begin: int = 0) 
         if first.ledger is not None and frame.ledger is not None:
             check_energy(simulation.scene, simulation.model, first.ledger, frame.ledger)
         yield k, frame
+        del frame  # millions of particles need the memory
 
 
 def told(source: FrameSource, progress: Progress | None) -> Iterator[Frame]:

@@ -11,6 +11,7 @@ from particlesim.core.constants import MOVIE_ENDINGS
 from particlesim.core.output_path import check_output, check_sequence, is_sequence
 from particlesim.jobs.compiling import compile_kernels
 from particlesim.jobs.frame_source import FrameSource, Progress, frame_source, frame_source_until, opened, tell
+from particlesim.jobs.kept import check_kept, uses_of_pictures
 from particlesim.jobs.partial_run import PartialRun
 from particlesim.jobs.pictures import Pictures, summary_of, timed
 from particlesim.jobs.provenance import as_tags, as_text, provenance, texts_of_pictures
@@ -81,13 +82,16 @@ def simulate(
         if run.kept and run.state:
             summary.go_on(run.kept["values"])
         growing = run.folder / "trajectory.gsd"
-        with TrajectoryWriter(growing, source.header, summary.frames) as writer:
+        kept = scene.trajectory.kept(summary.frames)
+        with TrajectoryWriter(growing, source.header, kept) as writer:
             try:
-                for _, frame in timed(summary, source.phase, source.frames):
+                for number, frame in timed(summary, source.phase, source.frames):
                     if frame is not None:
-                        writer.append(frame)
+                        if scene.trajectory.keeps(number):
+                            writer.append(frame)
                         summary.add(frame)
                         tell(progress, source.phase, summary.frames, source.total)
+                        del frame  # millions of particles need the memory
                     if run.due():
                         writer.flush()
                         run.keep(summary.frames, source.total, source.simulation, summary.table())
@@ -151,6 +155,7 @@ def render(
     path = Path(path)
     check_sequence(path)
     with opened(source) as movable, PartialRun(path, task_of(movable, look, frames, shard), resume) as run:
+        check_kept(movable, uses_of_pictures(look or _scene_of(movable)))
         part = None if shard is None else part_of(movable, frames, shard)
         platform.choose()
         platform.describe_ffmpeg()  # which fails now, if it does, and not when all is simulated
@@ -223,6 +228,7 @@ def still(
     if not math.isfinite(time):
         raise ValueError(f"time must be a finite number of seconds, not {time!r}")
     with opened(source) as movable:
+        check_kept(movable, uses_of_pictures(look or _scene_of(movable)))
         platform.choose()
         _compile(movable, look, progress)
         chosen = frame_source_until(time, movable, threads, progress)
@@ -239,5 +245,8 @@ def still(
 
 def _compile(source: Scene | Trajectory, look: Scene | None, progress: Progress | None) -> None:
     """Compile what pictures of a source need, its own or with the ``look`` of another scene."""
-    own, simulated = (source.scene, None) if isinstance(source, Trajectory) else (source, source)
-    compile_kernels(simulated, (look or own).movie, progress)
+    compile_kernels(source if isinstance(source, Scene) else None, (look or _scene_of(source)).movie, progress)
+
+
+def _scene_of(source: Scene | Trajectory) -> Scene:
+    return source if isinstance(source, Scene) else source.scene

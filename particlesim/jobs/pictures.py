@@ -172,3 +172,4 @@ def timed(summary: Summary, name: str, passing: Iterable[_T]) -> Iterator[_T]:
         if thing is None:
             return
         yield thing
+        del thing  # which may be large

@@ -6,7 +6,7 @@ import hashlib
 import importlib.metadata
 import json
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -100,21 +100,22 @@ def replayed(trajectory: Trajectory, number: int, threads: int | None, progress:
 
     They cover the time, all that is stored of the particles, and the ledger. IndexError if there is no such frame.
     """
-    stored = trajectory[number]
-    simulation = start(trajectory.scene, threads, progress)
-    for k in range(number + 1):
-        simulation.run_until(simulation.scene.time_of(k))
-        tell(progress, "simulating", k, number + 1)
-    return _digest(stored), _digest(simulation.frame())
+    stored, scene = trajectory[number], trajectory.scene
+    simulation = start(scene, threads, progress)
+    total = scene.trajectory.every * number + 1
+    for k in range(total):
+        simulation.run_until(scene.time_of(k))
+        tell(progress, "simulating", k, total)
+    return _digest(stored, trajectory.fields), _digest(simulation.frame(), trajectory.fields)
 
 
-def _digest(frame: Frame) -> str:
-    """SHA-256 of what a file keeps of a frame."""
+def _digest(frame: Frame, fields: Sequence[str]) -> str:
+    """SHA-256 of what a file with these ``fields`` keeps of a frame."""
     total = hashlib.sha256()
-    for single in (frame.position, frame.orientation, frame.velocity):
-        total.update(single.astype(np.float32).tobytes())
-    for whole in (frame.image, frame.impacts):
-        total.update(whole.astype(np.int64).tobytes())
+    for single in (name for name in ("position", "orientation", "velocity") if name in fields):
+        total.update(getattr(frame, single).astype(np.float32).tobytes())
+    for whole in (name for name in ("image", "impacts") if name in fields):
+        total.update(getattr(frame, whole).astype(np.int64).tobytes())
     assert frame.ledger is not None
     total.update(json.dumps([frame.time, ledger_table(frame.ledger)], sort_keys=True).encode())
     return total.hexdigest()

@@ -10,6 +10,7 @@ from particlesim.core.atomic_write import atomic_write
 from particlesim.core.output_path import check_output
 from particlesim.jobs.compiling import compile_kernels
 from particlesim.jobs.frame_source import Progress, frame_source, frames_ahead, opened, told
+from particlesim.jobs.kept import check_kept, uses_of_pictures
 from particlesim.rendering.shading.colour import ParticleColours
 from particlesim.rendering.shading.fields import is_settled_by_frames
 from particlesim.rendering.web.page import check_size, page
@@ -73,6 +74,8 @@ def view(
         if isinstance(movable, Scene):
             check_size(movable.number, len(frames) if frames is not None else movable.frames)
             compile_kernels(movable, None, progress)
+        else:
+            check_kept(movable, {**uses_of_pictures(movable.scene), "orientation": "a page", "velocity": "a page"})
         chosen = frame_source(movable, frames, threads, progress)
         check_size(len(chosen.header.shape), len(chosen.wanted))
         coming, sample = chosen.frames, [chosen.first]

@@ -63,14 +63,23 @@ def world_box(scene: Scene) -> Box:
 
 def subject_box(scene: Scene, header: Header, first: Frame) -> Box:
     """What the scene's camera frames, as ``first``, the frame at the start, foretells it."""
-    subject = getattr(scene.camera, "subject", "world")
-    world = world_box(scene)
-    is_open = np.array([boundary == "open" for boundary in scene.world.boundary])
-    by_particles = {"auto": is_open, "world": np.zeros(3, bool), "particles": np.ones(3, bool)}[subject]
+    world, by_particles = world_box(scene), _axes_by_particles(scene)
     if not by_particles.any() or not len(first.position):
         return world
     reach = _reach(scene, header, first, world)
     return Box(np.where(by_particles, reach.lower, world.lower), np.where(by_particles, reach.upper, world.upper))
+
+
+def foresees_flight(scene: Scene) -> bool:
+    """Whether what the scene's camera frames depends on the velocities at the start."""
+    return bool(_axes_by_particles(scene).any())
+
+
+def _axes_by_particles(scene: Scene) -> np.ndarray:
+    """Along which axes the camera frames particles, and not the world, (3,) bool."""
+    subject = getattr(scene.camera, "subject", "world")
+    is_open = np.array([boundary == "open" for boundary in scene.world.boundary])
+    return {"auto": is_open, "world": np.zeros(3, bool), "particles": np.ones(3, bool)}[subject]
 
 
 def frames_freely(scene: Scene) -> bool:

@@ -18,6 +18,7 @@ from particlesim.scene.flow import Emitter, Sink
 from particlesim.scene.groups import Group
 from particlesim.scene.messages import hint, must_be, shown
 from particlesim.scene.obstacles import Obstacle
+from particlesim.scene.recording import Recording
 from particlesim.scene.surface import WALLS, Contact
 from particlesim.scene.validation_errors import explain
 from particlesim.scene.world import Solver, World
@@ -49,6 +50,7 @@ class Scene(Model):
         default_factory=list, description="what two groups do to each other, in place of what they usually do"
     )
     solver: Solver = Field(default_factory=Solver, description="how the motion is computed")
+    trajectory: Recording = Field(default_factory=Recording, description="what is kept of the motion in a file of it")
     movie: Movie = Field(default_factory=Movie, description="the file that comes out")
     camera: Camera = Field(default_factory=lambda: FixedCamera(kind="fixed"), description="where it is seen from")
     show: Show = Field(default_factory=Show, description="what is drawn besides particles")

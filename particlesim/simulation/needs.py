@@ -13,9 +13,12 @@ from particlesim.scene.camera import Movie
 from particlesim.scene.groups import SphereShape
 from particlesim.setup.memory import check_memory
 
-# Bytes of a frame of a trajectory: its ledger; position, orientation, velocity and impacts of each particle; angular
-# momentum, which smooth spheres do not have; how often each went round a periodic world.
-_LEDGER, _PARTICLE, _SPIN, _IMAGE = 2400, 44, 16, 12
+# Bytes of a frame of a trajectory: its ledger, and quantities of each particle in single precision and, if asked for,
+# in double precision as well. Of what is 0 all the time nothing is written: angular momenta of smooth spheres, and how
+# often each went round a world that is not periodic.
+_LEDGER = 2400
+_SINGLE = {"position": 12, "orientation": 16, "velocity": 12, "angular_momentum": 16, "image": 12, "impacts": 4}
+_DOUBLE = {"position": 24, "orientation": 32, "velocity": 24, "angular_momentum": 24}
 
 # Bytes of a checkpoint for each particle; the one before goes when the next is whole.
 _CHECKPOINT = 2 * 430
@@ -27,12 +30,15 @@ _PIXEL, _LEAST = 0.04, 0.001
 
 def trajectory_bytes(scene: Scene) -> float:
     """Of a whole run."""
-    particle = _PARTICLE
-    if not all(isinstance(group.shape, SphereShape) for group in scene.groups):
-        particle += _SPIN
-    if "periodic" in scene.world.boundary:
-        particle += _IMAGE
-    return float(scene.frames) * (_LEDGER + particle * scene.number)
+    nothing = {
+        "angular_momentum": all(isinstance(group.shape, SphereShape) for group in scene.groups),
+        "image": "periodic" not in scene.world.boundary,
+    }
+    kept = [name for name in scene.trajectory.fields if not nothing.get(name)]
+    particle = sum(_SINGLE[name] for name in kept)
+    if scene.trajectory.precision == "double":
+        particle += sum(_DOUBLE.get(name, 0) for name in scene.trajectory.fields)
+    return float(scene.trajectory.kept(scene.frames)) * (_LEDGER + particle * scene.number)
 
 
 def movie_bytes(movie: Movie, pictures: int, at_crf_18: float = _PIXEL) -> float:

@@ -135,7 +135,7 @@ class Header:
 
 @dataclass(frozen=True)
 class Frame:
-    """The particles at one time.
+    """The particles at one time. What a file of it has not kept is not a number; orientations are as of nothing turned.
 
     Attributes
     ----------
@@ -176,6 +176,18 @@ class Frame:
     def ids(self) -> np.ndarray:
         """Where in the header each of its particles is, (n,) int64."""
         return np.arange(len(self.position)) if self.present is None else self.present
+
+    @property
+    def nbytes(self) -> int:
+        """Of memory; values that stand for all particles take none."""
+        arrays = (value for value in vars(self).values() if isinstance(value, np.ndarray) and value.size)
+        return sum(array.nbytes for array in arrays if array.strides[0])
+
+    def some(self, most: int) -> Frame:
+        """Every so manieth of its particles, so that there are ``most`` of them or fewer."""
+        step = -(-len(self.position) // most)
+        names = "position", "orientation", "velocity", "angular_momentum", "image", "impacts"
+        return replace(self, present=self.ids[::step], **{name: getattr(self, name)[::step] for name in names})
 
     def rows(self, ids: np.ndarray) -> np.ndarray:
         """Where in the frame the particles with these ids (k,) are, (k,)."""

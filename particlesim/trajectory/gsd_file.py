@@ -17,7 +17,6 @@ import gsd.hoomd
 import numpy as np
 
 from particlesim.core.arguments import checked_arguments, shown
-from particlesim.core.rotations import conjugates, quaternion_products
 from particlesim.scene import Scene
 from particlesim.scene.file import stored_scene
 from particlesim.trajectory.foreign_gsd import FRAME_RATE, Foreign, check_same_particles, read_foreign
@@ -25,6 +24,7 @@ from particlesim.trajectory.frames import Frame, Header, Ledger
 from particlesim.trajectory.gsd_chunks import Chunks, TrajectoryError, cut, reading, room_in_index
 from particlesim.trajectory.gsd_header import LOG, OLDER, checked_header, header_log, read_header
 from particlesim.trajectory.gsd_ledger import ledger_log, ledger_names, read_ledger
+from particlesim.trajectory.gsd_particles import IMPACTS, has_images, particle_chunks, read_particles, recording_of
 from particlesim.trajectory.gsd_types import display_diameters, display_types
 
 if TYPE_CHECKING:
@@ -32,25 +32,16 @@ if TYPE_CHECKING:
 
     from particlesim.trajectory.analysis.measurements import Measurements
 
-# Under this prefix OVITO finds quantities of the particles.
-_IMPACTS = "log/particles/impacts"
 _ID = "log/particles/id"
 
-# Quantities of a particle, with what stands for those that are not in the file (the schema's defaults).
-_DEFAULTS: dict[str, tuple[float, ...]] = {
-    "position": (0.0, 0.0, 0.0),
-    "orientation": (1.0, 0.0, 0.0, 0.0),
-    "velocity": (0.0, 0.0, 0.0),
-    "angmom": (0.0, 0.0, 0.0, 0.0),
-    "image": (0.0, 0.0, 0.0),
-}
+# Under this prefix is what the schema has of particles.
+_SCHEMA = "particles/"
 
 # How far the square of a quaternion's length may be from 1: rounding to single precision leaves 1e-6.
 _UNIT = 1e-3
 
-
 # Chunks of a frame at most: what the schema has, what we add to the first one, and the ledger.
-_CHUNKS = 32 + len(ledger_names())
+_CHUNKS = 40 + len(ledger_names())
 
 
 class TrajectoryWriter:
@@ -59,6 +50,7 @@ class TrajectoryWriter:
     def __init__(self, path: Path, header: Header, kept: int = 0) -> None:
         self._path, self._header = Path(path), header
         self._box = [*json.loads(header.scene_json)["world"]["size"], 0.0, 0.0, 0.0]
+        self._recording = recording_of(header)
         self._types, self._type_of = display_types(header)
         if kept:
             cut(path, kept)
@@ -86,11 +78,12 @@ class TrajectoryWriter:
         out.configuration.box = self._box
         particles = out.particles
         particles.N = len(ids)
-        particles.position = frame.position.astype(np.float32)
-        particles.orientation = frame.orientation.astype(np.float32)
-        particles.velocity = frame.velocity.astype(np.float32)
-        particles.angmom = _quaternion_momentum(frame).astype(np.float32)
-        particles.image = frame.image.astype(np.int32)
+        own = {LOG + "time": np.array([frame.time])}
+        for chunk, values in particle_chunks(frame, self._recording).items():
+            if chunk.startswith(_SCHEMA):
+                setattr(particles, chunk.removeprefix(_SCHEMA), values)
+            else:
+                own[chunk] = values
         if self._count == 0:
             particles.types = [name for name, _ in self._types]
             particles.type_shapes = [shape for _, shape in self._types]
@@ -100,7 +93,6 @@ class TrajectoryWriter:
             particles.mass = header.mass[ids].astype(np.float32)
             particles.moment_inertia = header.inertia[ids].astype(np.float32)
             particles.diameter = display_diameters(header)[ids]
-        own = {_IMPACTS: frame.impacts.astype(np.uint32), LOG + "time": np.array([frame.time])}
         if frame.present is not None:
             own[_ID] = ids.astype(np.uint32)
         out.log.update(_logged({**own, **ledger_log(frame.ledger)}))
@@ -133,10 +125,11 @@ class Trajectory:
                 if not chunks.frames:
                     raise TrajectoryError(f"{path}: has no frames")
                 self._is_own = chunks.has(LOG + "scene")
-                if self._is_own and not all(chunks.has(name) for name in (_IMPACTS, *ledger_names())):
-                    raise TrajectoryError(f"{path}: {OLDER}")
+                self._check_has(*ledger_names())
                 found = Foreign(read_header(chunks), ()) if self._is_own else read_foreign(chunks)
                 self.header, self.assumed = checked_header(found.header), found.assumed
+                self._recording, self._images = recording_of(self.header), has_images(self.header)
+                self._check_has(*([IMPACTS] if "impacts" in self.fields else []))
         except BaseException:
             chunks.close()
             raise
@@ -156,6 +149,11 @@ class Trajectory:
 
     def __iter__(self) -> Iterator[Frame]:
         return (self[k] for k in range(len(self)))
+
+    @property
+    def fields(self) -> list[str]:
+        """Which quantities of the particles it keeps."""
+        return self._recording.fields
 
     @functools.cached_property
     def scene(self) -> Scene:
@@ -229,6 +227,11 @@ class Trajectory:
         with reading(self.path):
             return self._chunks.read(name).tobytes().decode() if self._chunks.has(name) else None
 
+    def _check_has(self, *names: str) -> None:
+        """TrajectoryError if a file of ours has not all of these chunks."""
+        if self._is_own and not all(self._chunks.has(name) for name in names):
+            raise TrajectoryError(f"{self.path}: {OLDER}")
+
     def _check_number(self, k: int) -> None:
         """IndexError if there is no frame ``k``."""
         if not 0 <= k < len(self):
@@ -252,7 +255,7 @@ class Trajectory:
 
     @checked_arguments
     def __getitem__(self, k: int) -> Frame:
-        """Frame ``k``, 0 the first; positions and motion as the file stores them, in single precision."""
+        """Frame ``k``, 0 the first; numbers in the precision of the file, and what it does not keep not a number."""
         self._check_number(k)
         with reading(self.path):
             if not self._is_own:
@@ -261,22 +264,10 @@ class Trajectory:
             count = len(self.header.shape) if present is None else len(present)
             if present is not None and ((present >= len(self.header.shape)).any() or (np.diff(present) <= 0).any()):
                 raise ValueError(f"ids of frame {k}")
-            each = {
-                name: self._chunks.rows("particles/" + name, count, default, k) for name, default in _DEFAULTS.items()
-            }
-            if (np.abs((each["orientation"] ** 2).sum(axis=1) - 1.0) > _UNIT).any():
+            values = read_particles(self._chunks, self._recording, count, k, self._images)
+            if (np.abs((values["orientation"] ** 2).sum(axis=1) - 1.0) > _UNIT).any():
                 raise ValueError(f"orientations of frame {k}")
-            return Frame(
-                time=self.time(k),
-                position=each["position"],
-                orientation=each["orientation"],
-                velocity=each["velocity"],
-                angular_momentum=_world_momentum(each["angmom"], each["orientation"]),
-                image=each["image"].astype(np.int64),
-                impacts=self._chunks.rows(_IMPACTS, count, (0.0,), k)[:, 0].astype(np.int64),
-                ledger=self.ledger(k),
-                present=present,
-            )
+            return Frame(time=self.time(k), **values, ledger=self.ledger(k), present=present)
 
 
 @checked_arguments
@@ -306,14 +297,3 @@ def open(path: str | Path) -> Trajectory:
 def _logged(chunks: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Chunks by the names that the writer of the schema gives logged quantities: without their prefix."""
     return {name.removeprefix("log/"): values for name, values in chunks.items()}
-
-
-def _quaternion_momentum(frame: Frame) -> np.ndarray:
-    """Angular momenta as HOOMD stores them, 2 q (0, L_body) = 2 (0, L) q, (n, 4)."""
-    momentum = np.hstack([np.zeros((len(frame.angular_momentum), 1)), frame.angular_momentum])
-    return 2.0 * quaternion_products(momentum, frame.orientation)
-
-
-def _world_momentum(stored: np.ndarray, orientation: np.ndarray) -> np.ndarray:
-    """Angular momenta in world axes from HOOMD's quaternions, (n, 3)."""
-    return 0.5 * quaternion_products(stored, conjugates(orientation))[:, 1:]

@@ -95,8 +95,10 @@ class Measurements:
         ids = frame.ids
         kept = np.isin(ids, self._chosen)
         self._radial.add(frame.position[kept])
-        self._speeds.append(np.linalg.norm(frame.velocity[kept], axis=1))
-        self._masses.append(self.header.mass[ids[kept]])
+        speed = np.linalg.norm(frame.velocity[kept], axis=1)
+        known = np.isfinite(speed)  # unless velocities are not in a file
+        self._speeds.append(speed[known])
+        self._masses.append(self.header.mass[ids[kept]][known])
 
     def _displaced(self, frame: Frame) -> np.ndarray:
         """How far the particles that were there at first, and still are, have come since, (m, 3) [m]."""
