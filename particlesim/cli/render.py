@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from particlesim.cli.errors import OptionError, one_line_errors
-from particlesim.cli.options import Every, MaxDrift, Quiet, Resume, SomeFrames, Threads
+from particlesim.cli.options import Every, MaxDrift, Quiet, Resume, Scheduler, SomeFrames, Threads, WorkerCount
 from particlesim.cli.output import place_for
 from particlesim.cli.render_options import RenderOptions, frames_asked, scene_as_asked, shard_asked, still_time
 from particlesim.cli.run import load, make_file
@@ -64,6 +64,8 @@ def render(
         str | None,
         typer.Option("--scale", metavar="S", help="Simulate S times as many particles, sized to fill as much."),
     ] = None,
+    workers: WorkerCount = None,
+    scheduler: Scheduler = None,
     resume: Resume = False,
     quiet: Quiet = False,
     threads: Threads = None,
@@ -79,8 +81,9 @@ def render(
         _opened(source, options, quiet) as (subject, scene, total),
     ):
         time = still_time(scene.duration, options)
-        if time is not None and resume:
-            raise OptionError("--resume: of a movie, not of the one picture that --still asks for")
+        for option, value in (("--resume", resume), ("--workers", workers), ("--scheduler", scheduler)):
+            if time is not None and value:
+                raise OptionError(f"{option}: of a movie, not of the one picture that --still asks for")
         chosen = None if time is not None else frames_asked(total, frames, every)
         from particlesim.simulation.needs import check_movie  # noqa: PLC0415
 
@@ -90,7 +93,15 @@ def render(
         from particlesim.jobs import movie  # noqa: PLC0415
 
         if time is None:
-            make = partial(movie.render, look=scene, frames=chosen, shard=shard_asked(options), resume=resume)
+            make = partial(
+                movie.render,
+                look=scene,
+                frames=chosen,
+                shard=shard_asked(options),
+                workers=workers,
+                scheduler=scheduler,
+                resume=resume,
+            )
         else:
             make = partial(movie.still, look=scene, time=time)
         make_file(make, subject, path, quiet, threads, max_drift)

@@ -17,7 +17,7 @@ from particlesim.scene.file import load_scene
 from particlesim.simulation.estimate import check_end
 from particlesim.simulation.simulation import Simulation
 from particlesim.simulation.soundness import check_energy
-from particlesim.trajectory.frames import Frame, Header
+from particlesim.trajectory.frames import Frame, Header, Ledger
 from particlesim.trajectory.gsd_file import Trajectory
 
 # Memory for frames that are simulated before the first is drawn [bytes], and how many are looked at.
@@ -132,7 +132,7 @@ def frame_source(
         del simulation  # there may be no memory for two
         simulation = Simulation.load(run.state, threads=threads)
     total = max(wanted) + 1
-    frames = frames_of(simulation, first, total, kept if run is not None and run.state else 0)
+    frames = frames_of(simulation, first.ledger, total, kept if run is not None and run.state else 0)
     return FrameSource(source, header, first, frames, total, wanted, "simulating", simulation)
 
 
@@ -147,7 +147,7 @@ def frame_source_until(
     before = source.frame_at(time) + 1
 
     def frames() -> Frames:
-        yield from frames_of(simulation, first, before)
+        yield from frames_of(simulation, first.ledger, before)
         simulation.run_until(time)
         yield before, simulation.frame()
 
@@ -163,10 +163,10 @@ def start(scene: Scene, threads: int | None, progress: Progress | None) -> Simul
     return simulation
 
 
-def frames_of(simulation: Simulation, first: Frame, total: int, begin: int = 0) -> Frames:
+def frames_of(simulation: Simulation, first: Ledger | None, total: int, begin: int = 0) -> Frames:
     """Frames ``begin`` to ``total`` - 1 of a scene and their numbers: at time zero and at every tick of its movie.
 
-    SimulationError where one cannot be, such as for its energy after the ``first``.
+    SimulationError where one cannot be, such as for its energy after that of the ``first``.
     """
     for k in range(begin, total):
         end = simulation.scene.time_of(k)
@@ -175,8 +175,8 @@ def frames_of(simulation: Simulation, first: Frame, total: int, begin: int = 0) 
             if simulation.time < end:
                 yield k, None
         frame = simulation.frame()
-        if first.ledger is not None and frame.ledger is not None:
-            check_energy(simulation.scene, simulation.model, first.ledger, frame.ledger)
+        if first is not None and frame.ledger is not None:
+            check_energy(simulation.scene, simulation.model, first, frame.ledger)
         yield k, frame
         del frame  # millions of particles need the memory
 

@@ -10,12 +10,22 @@ from particlesim.core.arguments import checked_arguments
 from particlesim.core.constants import MOVIE_ENDINGS
 from particlesim.core.output_path import check_output, check_sequence, is_sequence
 from particlesim.jobs.compiling import compile_kernels
-from particlesim.jobs.frame_source import FrameSource, Progress, frame_source, frame_source_until, opened, tell
+from particlesim.jobs.frame_source import (
+    FrameSource,
+    Progress,
+    frame_source,
+    frame_source_until,
+    frames_of,
+    opened,
+    start,
+    tell,
+)
 from particlesim.jobs.kept import check_kept, uses_of_pictures
 from particlesim.jobs.partial_run import PartialRun
 from particlesim.jobs.pictures import Pictures, summary_of, timed
 from particlesim.jobs.provenance import as_tags, as_text, provenance, texts_of_pictures
 from particlesim.jobs.shards import part_of, shard_table
+from particlesim.jobs.shared_movie import check_shared, render_shared
 from particlesim.jobs.summary import Summary
 from particlesim.jobs.task import task_of
 from particlesim.rendering import write_image
@@ -26,6 +36,7 @@ from particlesim.scene import Scene
 from particlesim.scene.camera import Movie
 from particlesim.scene.file import load_scene
 from particlesim.simulation.needs import check_movie, check_simulation
+from particlesim.simulation.simulation import Simulation
 from particlesim.simulation.soundness import SimulationError
 from particlesim.trajectory.gsd_file import Trajectory, TrajectoryWriter
 
@@ -77,27 +88,28 @@ def simulate(
     check_simulation(scene, Path(path))
     with PartialRun(path, task_of(scene), resume) as run:
         compile_kernels(scene, None, progress)
-        source = frame_source(scene, None, threads, progress, run)
-        summary = summary_of(scene, source.header)
+        simulation = Simulation.load(run.state, threads=threads) if run.state else start(scene, threads, progress)
+        summary = summary_of(scene, simulation.header)
         if run.kept and run.state:
             summary.go_on(run.kept["values"])
+        frames = frames_of(simulation, summary.first or simulation.ledger, scene.frames, summary.frames)
         growing = run.folder / "trajectory.gsd"
         kept = scene.trajectory.kept(summary.frames)
-        with TrajectoryWriter(growing, source.header, kept) as writer:
+        with TrajectoryWriter(growing, simulation.header, kept) as writer:
             try:
-                for number, frame in timed(summary, source.phase, source.frames):
+                for number, frame in timed(summary, "simulating", frames):
                     if frame is not None:
                         if scene.trajectory.keeps(number):
                             writer.append(frame)
                         summary.add(frame)
-                        tell(progress, source.phase, summary.frames, source.total)
+                        tell(progress, "simulating", summary.frames, scene.frames)
                         del frame  # millions of particles need the memory
                     if run.due():
                         writer.flush()
-                        run.keep(summary.frames, source.total, source.simulation, summary.table())
+                        run.keep(summary.frames, scene.frames, simulation, summary.table())
             except SimulationError:
                 writer.flush()
-                run.keep(summary.frames, source.total, None, summary.table())
+                run.keep(summary.frames, scene.frames, None, summary.table())
                 raise
         os.replace(growing, path)
     summary.path = Path(path)
@@ -112,6 +124,8 @@ def render(
     look: Scene | None = None,
     frames: range | None = None,
     shard: tuple[int, int] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
     resume: bool = False,
     progress: Progress | None = None,
     threads: int | None = None,
@@ -132,6 +146,9 @@ def render(
     shard
         (k, n): only part k of n of the movie of a trajectory, 1 the first; ``join`` makes the movie of all parts. The
         poster lies beside the one that has its picture. A part must be .mp4.
+    workers, scheduler
+        Let so many processes of this machine, or the workers of a Dask scheduler, draw the segments of the movie of a
+        trajectory, as for ``shared_among``: its bytes are the same. A script needs ``if __name__ == "__main__"``.
     resume, progress, threads
         As for ``simulate``.
 
@@ -145,21 +162,29 @@ def render(
     RenderError
         If this machine cannot draw or cannot encode, found out before any work, or can no longer.
     TrajectoryError
-        If the source is a file that is no trajectory, or damaged.
+        If the source is a file that is no trajectory, or damaged, or has not kept what is to be drawn.
     ValueError
-        For frames or a part that are not there.
+        For frames or a part that are not there, or for what workers cannot share.
+    MissingExtraError, WorkersError
+        As for ``shared_among``.
     OutputError, PartialRunError, SceneError, SimulationError, OSError
         As for ``simulate``.
     """
     check_output(path, *(MOVIE_ENDINGS if shard is None else MOVIE_ENDINGS[:1]), beside=(".png",))
     path = Path(path)
     check_sequence(path)
+    is_shared = (workers, scheduler) != (None, None)
+    if is_shared:
+        check_shared(source, path, shard)
     with opened(source) as movable, PartialRun(path, task_of(movable, look, frames, shard), resume) as run:
         check_kept(movable, uses_of_pictures(look or _scene_of(movable)))
         part = None if shard is None else part_of(movable, frames, shard)
         platform.choose()
         platform.describe_ffmpeg()  # which fails now, if it does, and not when all is simulated
         _compile(movable, look, progress)
+        if is_shared and isinstance(movable, Trajectory):
+            by = workers, scheduler, threads
+            return render_shared(movable, path, look or movable.scene, frames, run, by, progress)
         chosen = frame_source(movable, frames, threads, progress, run, part)
         scene = look or chosen.scene
         check_movie(scene, path, len(chosen.wanted), chosen.trajectory is None)

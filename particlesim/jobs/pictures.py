@@ -25,18 +25,25 @@ from particlesim.trajectory.frames import Frame, Header
 
 _T = TypeVar("_T")
 
-_POSTER = "poster.npy"
+# Where a run keeps the poster of its movie.
+POSTER = "poster.npy"
 
 
 class Pictures:
     """Makes the pictures of the frames of a source, as ``scene`` says. A context manager: it holds Drawers.
 
-    With a ``run`` it goes on where that was left, and keeps in it what is done. ``summary``: what the frames that have
-    passed amount to. RenderError if this machine cannot draw.
+    With a ``run`` it goes on where that was left, and keeps in it what is done. What has ``passed`` before a part of a
+    movie is read, if it is not given, and so is what comes after it. ``summary``: what the frames that have passed
+    amount to. RenderError if this machine cannot draw.
     """
 
     def __init__(
-        self, source: FrameSource, scene: Scene, progress: Progress | None, run: PartialRun | None = None
+        self,
+        source: FrameSource,
+        scene: Scene,
+        progress: Progress | None,
+        run: PartialRun | None = None,
+        passed: History | None = None,
     ) -> None:
         self._source, self._movie, self._progress, self._run = source, scene.movie, progress, run
         around = Environment(scene)
@@ -48,8 +55,12 @@ class Pictures:
         if run is not None and run.kept:
             self._go_on(run, run.kept["values"])
         else:
-            self._pass_over(source.wanted[: source.begin])
+            if passed is None:
+                self._pass_over(source.wanted[: source.begin])
+            else:
+                self._history = passed
             self.summary.drawn = source.begin
+        self._reads_all = passed is None
         self._wrong: SimulationError | None = None  # why there are no more frames
         self._frames = self._sound(timed(self.summary, source.phase, source.frames))
         # What is simulated ahead is not where the pictures are: such a run is simulated anew when it is gone on with.
@@ -92,7 +103,8 @@ class Pictures:
                 self._keep(self._run)
         if self._wrong is not None:
             raise self._wrong
-        self._pass_over(self._source.wanted[self._source.total :])
+        if self._reads_all:
+            self._pass_over(self._source.wanted[self._source.total :])
         summary.drawn -= self._source.begin
 
     def _pass_over(self, numbers: range) -> None:
@@ -134,13 +146,13 @@ class Pictures:
     def _go_on(self, run: PartialRun, values: dict[str, Any]) -> None:
         self.summary.go_on(values["summary"])
         self._history = History.of_table(values["history"])
-        if (run.folder / _POSTER).exists():
-            self.poster = np.load(run.folder / _POSTER)
+        if (run.folder / POSTER).exists():
+            self.poster = np.load(run.folder / POSTER)
 
     def _keep_poster(self, image: np.ndarray) -> None:
         self.poster = image
         if self._run is not None:
-            np.save(self._run.folder / _POSTER, image)
+            np.save(self._run.folder / POSTER, image)
 
     def _tell(self) -> None:
         """Say how many frames are done: those that have passed, but for the pictures that are yet to come."""

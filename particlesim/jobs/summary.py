@@ -77,6 +77,11 @@ class Summary:
         self._largest_gain = max(self._largest_gain, ledger.own_energy - self._least)
 
     @property
+    def first(self) -> Ledger | None:
+        """The ledger of the first frame, where there was one that had one."""
+        return self._first
+
+    @property
     def has_ledger(self) -> bool:
         """Whether energies and impacts are known; of what other programs wrote they are not."""
         return self._last is not None

@@ -7,12 +7,15 @@ worker dies is handed to another; only so many are handed out at a time, so that
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import importlib.metadata
 import importlib.util
 import logging
+import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from itertools import islice
+from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from particlesim.core.extras import require
@@ -27,6 +30,9 @@ _AHEAD = 2
 # Seconds to wait for a scheduler to answer, and for it to have a worker.
 _PATIENCE = 20.0
 
+# Bytes at each end of a file that tell it from others.
+_END = 2**20
+
 
 class WorkersError(RuntimeError):
     """Workers that cannot be had, or that all died of a task; the message is one line."""
@@ -37,6 +43,9 @@ class Workers(Protocol):
 
     def each(self, task: Callable[[_Item], _Result], items: Iterable[_Item]) -> Iterator[tuple[int, _Result]]:
         """What a task makes of each item, as it is done: the number of the item, and the result."""
+
+    def see(self, path: Path) -> bool:
+        """Whether all of them find the same file under this path, which is then made absolute, as this process does."""
 
 
 @contextmanager
@@ -90,6 +99,9 @@ class _Alone:
         for number, item in enumerate(items):
             yield number, _with_threads(task, self._threads, item)
 
+    def see(self, path: Path) -> bool:
+        return True
+
 
 class _Dask:
     """The workers of a Dask scheduler."""
@@ -121,6 +133,21 @@ class _Dask:
         except self._distributed.KilledWorker as error:
             number = numbers.get(getattr(error, "task", ""), 0)
             raise WorkersError(f"task {number + 1}: one worker after the other died of it, out of memory?") from None
+
+    def see(self, path: Path) -> bool:
+        own = _told_apart(path)
+        found = self._client.run(_told_apart, path.absolute(), on_error="return")
+        return all(told == own for told in found.values())
+
+
+def _told_apart(path: Path) -> tuple[int, str]:
+    """What tells a file from others: its size and a hash of its two ends. OSError if there is none."""
+    with path.open("rb") as file:
+        size = file.seek(0, os.SEEK_END)
+        file.seek(max(0, size - _END))
+        end = file.read()
+        file.seek(0)
+        return size, hashlib.sha256(file.read(_END) + end).hexdigest()
 
 
 def _with_threads(task: Callable[[_Item], _Result], threads: int | None, item: _Item) -> _Result:

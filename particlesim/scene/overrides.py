@@ -42,7 +42,7 @@ def with_colour(scene: Scene, colour: str) -> Scene:
         {**dict(group), "colour": colour, "colour_range": group.colour_range if group.colour == colour else None}
         for group in scene.groups
     ]
-    return replaced(scene, **_grouped(scene, recoloured))
+    return replaced(scene, **grouped(scene, recoloured))
 
 
 def with_look(scene: Scene, other: Scene) -> Scene:
@@ -53,7 +53,7 @@ def with_look(scene: Scene, other: Scene) -> Scene:
             own.model_copy(update={"colour": look.colour, "colour_range": look.colour_range})
             for own, look in zip(groups, other.groups, strict=True)
         ]
-    return scene.model_copy(update={**_grouped(scene, groups), **{key: getattr(other, key) for key in _LOOK}})
+    return scene.model_copy(update={**grouped(scene, groups), **{key: getattr(other, key) for key in _LOOK}})
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
@@ -72,7 +72,7 @@ def scaled(scene: Scene, factor: float) -> Scene:
     return replaced(
         scene,
         world=_rolling(scene.world, factor),
-        **_grouped(
+        **grouped(
             scene,
             [group if isinstance(group.placement, _AS_SAID) else _scaled(group, factor) for group in scene.groups],
         ),
@@ -82,7 +82,7 @@ def scaled(scene: Scene, factor: float) -> Scene:
     )
 
 
-def _grouped(scene: Scene, groups: list[Any]) -> dict[str, list[Any]]:
+def grouped(scene: Scene, groups: list[Any]) -> dict[str, list[Any]]:
     """Groups in the order of ``scene.groups`` under the keys that they stand in."""
     first = len(scene.particles)
     return {"particles": groups[:first], "emitters": groups[first:]}

@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.scene import Scene
+from particlesim.scene.groups import Group
+from particlesim.scene.overrides import grouped
 from particlesim.trajectory.frames import Frame, Header
 
 # A scale is divided evenly into so many parts at the most, with figures between them and at its ends.
@@ -46,6 +48,18 @@ def field_of(kind: str, scene: Scene, header: Header, frames: Sequence[Frame]) -
     ranges = (g.colour_range for g in scene.groups if g.colour == kind and g.colour_range)
     low, high = next(ranges, None) or scale(scene, header, frames)
     return Field(name, unit, float(low), float(high), values)
+
+
+def settled(scene: Scene, header: Header, frames: Sequence[Frame]) -> Scene:
+    """The scene with the scales that ``frames`` settle, in the order of time, as if it said them."""
+
+    def with_range(group: Group) -> Group:
+        if group.colour not in _CHANGING:
+            return group
+        field = field_of(group.colour, scene, header, frames)
+        return group.model_copy(update={"colour_range": (field.low, field.high)})
+
+    return scene.model_copy(update=grouped(scene, [with_range(group) for group in scene.groups]))
 
 
 def figures(low: float, high: float) -> list[tuple[float, str]]:

@@ -16,6 +16,11 @@ from particlesim.rendering.video.encoder import NO_PICTURES, Encoder
 from particlesim.rendering.video.joining import join_files
 
 
+def segment_file(folder: Path, number: int) -> Path:
+    """Where a closed segment lies."""
+    return folder / f"{number:06}.mp4"
+
+
 class Segments:
     """Encode a movie into a folder, from its start or from where it was left. A context manager.
 
@@ -87,13 +92,17 @@ class Segments:
         if self._pictures is not None:
             self._pictures.flush()
 
+    def close_open_one(self) -> None:
+        """Close the segment that is open, if one is: the last of a movie or part. RenderError if ffmpeg fails."""
+        if self._encoder is not None:
+            self._close((self.sent - 1) // SEGMENT)
+
     def join(self, tags: Mapping[str, str]) -> None:
         """Make the whole movie, or part, with these tags. RenderError if it has no pictures or ffmpeg fails."""
         if self.sent == self._first:
             raise RenderError(NO_PICTURES)
+        self.close_open_one()
         last = (self.sent - 1) // SEGMENT
-        if self._encoder is not None:
-            self._close(last)
         names = [self._segment(number).name for number in range(self._first // SEGMENT, last + 1)]
         start = time.perf_counter()
         join_files(self._folder, names, self._whole, tags)
@@ -108,7 +117,7 @@ class Segments:
         return self._folder / f"whole{self._ending}"
 
     def _segment(self, number: int) -> Path:
-        return self._folder / f"{number:06}.mp4"
+        return segment_file(self._folder, number)
 
     def _part(self, number: int) -> Path:
         # The ffmpeg of a run that was killed may still be writing: each process has names of its own.
