@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import dask
 import distributed
 import pytest
 
@@ -77,6 +78,14 @@ def test_what_kills_every_worker_is_given_up(two):
     with pytest.raises(WorkersError, match=r"^task 1: one worker after the other died of it"):
         list(two.each(always_dies, [1]))
     assert dict(two.each(square, [3])) == {0: 9}
+
+
+def test_workers_that_are_long_in_coming_back_are_waited_for():
+    # By itself the cluster would give up each of them at once, and what is left to do would never be done.
+    with dask.config.set({"distributed.deploy.lost-worker-timeout": "1 ms"}), shared_among(2, None, None) as found:
+        with pytest.raises(WorkersError, match=r"^task 1: one worker after the other died of it"):
+            list(found.each(always_dies, [1]))
+        assert dict(found.each(square, [3])) == {0: 9}
 
 
 def test_one_alone_needs_no_library(monkeypatch):

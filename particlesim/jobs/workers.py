@@ -30,6 +30,10 @@ _AHEAD = 2
 # Seconds to wait for a scheduler to answer, and for it to have a worker.
 _PATIENCE = 20.0
 
+# A cluster of this machine gives up for good what starts a worker again that has died, if none is there within 15 s,
+# which a process takes to start where all cores are busy. With all of them given up, tasks would wait for ever.
+_PATIENT = {"distributed.deploy.lost-worker-timeout": "1 day"}
+
 # Bytes at each end of a file that tell it from others.
 _END = 2**20
 
@@ -78,6 +82,7 @@ def shared_among(count: int | None, scheduler: str | None, threads: int | None) 
     distributed = require("distributed", "dask")
     with contextlib.ExitStack() as stack:
         if scheduler is None:
+            stack.enter_context(require("dask", "dask").config.set(_PATIENT))
             # One task at a time each: numbers of threads are ours to share out. Their log would repeat what is said.
             cluster = distributed.LocalCluster(
                 n_workers=count, threads_per_worker=1, dashboard_address=":0", silence_logs=logging.CRITICAL
