@@ -23,6 +23,7 @@ ROWS = (
     "'speed', 'pairs tested' or 'broad phases'"
 )
 TWO = "must be the names of two groups, or of one and an obstacle or 'walls', such as ['a', 'b']"
+FIELD = "must be 'speed', 'height', 'size' or 'impacts'"
 RANGE = "must be [low, high], two numbers, low below high"
 PIXELS = "must be [width, height] in pixels, two even whole numbers from 64 to 7680"
 

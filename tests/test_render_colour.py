@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from matplotlib import colormaps
 
 from particlesim.geometry import shapes
 from particlesim.rendering.gl import geometry
@@ -9,16 +10,22 @@ from particlesim.rendering.octree_cells import cell_lines
 from particlesim.rendering.shading.colour import (
     PALETTE,
     ParticleColours,
-    luminance,
-    map_begin,
-    map_colours,
     palette_colour,
     parse,
     shape_colours,
 )
+from particlesim.rendering.shading.colour_maps import encoded, luminance, map_colours
 from particlesim.rendering.shading.fields import field_of, figures
-from particlesim.scene import Scene
+from particlesim.scene import Scene, SceneError
+from particlesim.scene.colours import MAPS, FieldColour
+from particlesim.scene.file import stored_scene
 from particlesim.trajectory.frames import Frame, Header
+
+WHITE = np.ones(3)
+
+
+def viridis(fraction):
+    return map_colours(np.array(fraction), "viridis", encoded("#f4f2ee"))
 
 
 def header(kinds, shape, group=None):
@@ -36,8 +43,8 @@ def frame(velocity, time=0.0):
     return Frame(time, zero, turn, velocity, zero, zero.astype(int), np.zeros(len(velocity), int))
 
 
-def scene(*colours, gravity=(0.0, 0.0, 0.0), boundary="wall", span=None):
-    groups = [{"shape": "sphere", "count": 1, "colour": colour, "colour_range": span} for colour in colours]
+def scene(*colours, gravity=(0.0, 0.0, 0.0), boundary="wall"):
+    groups = [{"shape": "sphere", "count": 1, "colour": colour} for colour in colours]
     world = {"size": (1.0, 1.0, 4.0), "gravity": gravity, "boundary": boundary}
     return Scene(world=world, particles=groups)
 
@@ -87,8 +94,55 @@ def test_speed_colours_grow_lighter_and_their_scale_stays():
     assert faster[0].sum() < before[0].sum()
     assert np.array_equal(before[2], faster[2])
     assert np.array_equal(before[1], faster[1])
-    lightness = map_colours(np.linspace(0.0, 1.0, 200)) @ [0.2126, 0.7152, 0.0722]
-    assert np.all(np.diff(lightness) > 0.0)
+
+
+def lab(colours):
+    """CIELAB (n, 3) of sRGB 0 .. 1 (n, 3), white of D65 (IEC 61966-2-1; CIE 15:2004)."""
+    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    to_xyz = [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+    part = linear @ np.transpose(to_xyz) / [0.95047, 1.0, 1.08883]
+    root = np.where(part > 216.0 / 24389.0, np.cbrt(part), (24389.0 / 27.0 * part + 16.0) / 116.0)
+    x, y, z = root.T
+    return np.column_stack([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)])
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_maps_are_those_of_matplotlib(name):
+    place = np.linspace(0.0, 1.0, 256)
+    assert map_colours(place, name, WHITE) == pytest.approx(colormaps[name](place)[:, :3], abs=0.045)
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_maps_are_perceptually_even(name):
+    lightness = lab(map_colours(np.linspace(0.0, 1.0, 65), name, WHITE))[:, 0]
+    steps = np.diff(lightness)
+    # In blacker black than a screen can show lightness is no measure of what is seen.
+    steps = steps[lightness[1:] > 5.0]
+    assert lightness[-1] - lightness[0] > 70.0
+    assert steps.min() > 0.6 * steps.mean() and steps.max() < 1.4 * steps.mean()
+
+
+def test_maps_that_are_uneven_or_unknown_are_refused_with_the_reason():
+    for name in ("jet", "turbo", "hsv", "rainbow"):
+        with pytest.raises(SceneError, match=f'map = "{name}": must be .*; the lightness of this one does not grow'):
+            scene({"field": "speed", "map": name})
+    with pytest.raises(SceneError, match=r"map = \"virdis\": must be .* or 'cividis'; did you mean 'viridis'\?$"):
+        scene({"field": "speed", "map": "virdis"})
+
+
+def test_scenes_stored_by_version_0_1_are_read_as_they_were():
+    group = {"shape": "sphere", "count": 1, "colour": "by_height", "colour_range": [0, 3]}
+    plain = {"shape": "sphere", "count": 1, "colour": "red", "colour_range": None}
+    stored = stored_scene({"world": {"size": [4, 4, 4]}, "particles": [group, plain]})
+    assert stored.particles[0].colour == FieldColour(field="height", range=(0, 3))
+    assert stored.particles[1].colour == "red"
+
+
+def test_a_field_is_shown_in_the_colours_of_its_map():
+    quick = frame([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
+    colour = {"field": "speed", "map": "magma", "range": [0, 2]}
+    rgb = np.sqrt(of_all(ParticleColours(scene(colour), header(["sphere"], [0] * 3), [quick]), quick))
+    assert rgb == pytest.approx(colormaps["magma"]([0.0, 0.5, 1.0])[:, :3], abs=0.01)
 
 
 def test_speed_colours_of_particles_that_start_at_rest():
@@ -109,18 +163,18 @@ def test_each_field_colours_its_own_groups():
     colours = ParticleColours(mixed, head, [start])
     assert [field.name for field in colours.fields] == ["height", "size"]
     rgb = np.sqrt(of_all(colours, start))
-    assert rgb[:2] == pytest.approx(map_colours(np.array([0.0, 1.0])), abs=1e-6)
+    assert rgb[:2] == pytest.approx(viridis([0.0, 1.0]), abs=1e-6)
     # All sizes are on one scale, also those of groups coloured otherwise.
-    assert rgb[2:4] == pytest.approx(map_colours(np.array([1.0, 2.0]) / 3.0), abs=1e-6)
+    assert rgb[2:4] == pytest.approx(viridis([1.0 / 3.0, 2.0 / 3.0]), abs=1e-6)
     assert rgb[4] * 255 == pytest.approx([128, 64, 32], abs=1e-3)
 
 
 def test_impacts_colour_those_who_had_them():
     quiet = frame(np.zeros((3, 3)))
-    colours = ParticleColours(scene("by_impacts", span=(0.0, 10.0)), header(["sphere"], [0, 0, 0]), [quiet])
+    colours = ParticleColours(scene({"field": "impacts", "range": (0, 10)}), header(["sphere"], [0, 0, 0]), [quiet])
     quiet.impacts[:] = 0, 5, 50
     rgb = np.sqrt(of_all(colours, quiet))
-    assert rgb == pytest.approx(map_colours(np.array([0.0, 0.5, 1.0])), abs=2e-3)
+    assert rgb == pytest.approx(viridis([0.0, 0.5, 1.0]), abs=2e-3)
 
 
 def test_scales_are_given_or_settled_by_what_the_particles_come_to():
@@ -133,13 +187,14 @@ def test_scales_are_given_or_settled_by_what_the_particles_come_to():
     frames[1].impacts[:] = np.arange(100)
     frames[1].impacts[99] = 10**6
 
-    def scale(kind, **settings):
-        field = field_of(kind, scene(kind, **settings), head, frames)
+    def scale(colour, **settings):
+        some = scene(colour, **settings)
+        field = field_of(some.particles[0].colour, some, head, frames)
         return field.low, field.high
 
     # All but one in fifty are slower than 3.86 m/s; the next round end is 4.
     assert scale("by_speed") == scale("by_speed", gravity=(0.0, 0.0, -2.0)) == (0.0, 4.0)
-    assert scale("by_speed", span=(1.0, 5.0)) == (1.0, 5.0)
+    assert scale({"field": "speed", "range": (1.0, 5.0)}) == (1.0, 5.0)
     assert scale("by_height") == (-2.0, 2.0)
     assert scale("by_height", boundary="open") == pytest.approx((7.0, 9.0))
     assert scale("by_size") == (0.5, 1.5)  # all are of size 1
@@ -150,21 +205,21 @@ def test_scales_are_given_or_settled_by_what_the_particles_come_to():
 def test_most_particles_of_a_gas_are_neither_at_the_dark_end_nor_beyond_the_bright_one():
     rng = np.random.default_rng(1)
     gas = frame(rng.normal(size=(5000, 3)))
-    field = field_of("by_speed", scene("by_speed"), header(["sphere"], [0] * 5000), [gas])
+    field = field_of(FieldColour(field="speed"), scene("by_speed"), header(["sphere"], [0] * 5000), [gas])
     fractions = field.fractions(None, gas, np.arange(5000))
     assert np.median(fractions) == pytest.approx(0.45, abs=0.1) and (fractions > 1.0).mean() < 0.02
 
 
 @pytest.mark.parametrize("background", ["#000000", "#0b0e14", "#10141b", "#203040", "#f3f2ef", "#ffffff", "#808080"])
-def test_both_ends_of_a_scale_stand_off_from_the_background(background):
-    behind = np.sqrt(parse(background))
-    begin = map_begin(behind)
-    ends = map_colours(np.array([0.0, 1.0]), begin)
+@pytest.mark.parametrize("name", MAPS)
+def test_both_ends_of_a_scale_stand_off_from_the_background(background, name):
+    behind = encoded(background)
+    ends = map_colours(np.array([0.0, 1.0]), name, behind)
     light = luminance(np.vstack([behind, ends])) + 0.05
     if light[0] < 0.1:
         assert light[1] / light[0] >= 2.45 and light[2] / light[0] > 5.0
     else:
-        assert begin == 0.0
+        assert np.array_equal(ends, map_colours(np.array([0.0, 1.0]), name, WHITE))
 
 
 @pytest.mark.parametrize(
@@ -197,7 +252,7 @@ def test_every_scale_has_three_to_five_figures_on_it_and_one_at_each_end():
 
 def test_cells_have_twelve_edges_each():
     lower = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
-    rows = cell_lines(lower, lower + np.array([1.0, 2.0, 3.0]), np.array([1, 5]), width=1.0)
+    rows = cell_lines(lower, lower + np.array([1.0, 2.0, 3.0]), np.array([1, 5]), width=1.0, background=WHITE)
     assert rows.shape == (24, 11)
     length = np.linalg.norm(rows[:, 4:7] - rows[:, :3], axis=1)
     assert np.array_equal(np.unique(length, return_counts=True)[1], [8, 8, 8])

@@ -139,10 +139,11 @@ def test_the_look_of_another_scene_is_taken(folder):
     assert ((picture[..., 1] > 2 * picture[..., 0]) & (picture[..., 1] > 80)).sum() > 100
 
 
-def test_a_range_is_forgotten_with_the_field_that_it_was_given_for():
-    one = scene({"shape": "sphere", "count": 3, "colour": "by_speed", "colour_range": (0.0, 2.0)})
-    assert with_colour(one, "by_speed").particles[0].colour_range == (0.0, 2.0)
-    assert with_colour(one, "by_height").particles[0].colour_range is None
+def test_a_scale_is_forgotten_with_the_field_that_it_was_given_for():
+    one = scene({"shape": "sphere", "count": 3, "colour": {"field": "speed", "map": "magma", "range": (0.0, 2.0)}})
+    assert with_colour(one, "by_speed").particles[0].colour == one.particles[0].colour
+    assert with_colour(one, "by_height").particles[0].colour.range is None
+    assert with_colour(one, {"field": "speed"}).particles[0].colour.range is None
 
 
 def test_what_stays_is_neither_copied_nor_checked_again():
@@ -226,4 +227,4 @@ def test_a_look_leaves_the_physics_alone():
     both = with_look(one, other)
     assert (both.world, both.particles[0].count, both.particles[0].shape.kind) == (one.world, 3, "sphere")
     assert (both.camera, both.movie, both.show) == (other.camera, other.movie, other.show)
-    assert both.particles[0].colour == "by_speed"
+    assert both.particles[0].colour.field == "speed"

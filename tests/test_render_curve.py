@@ -10,7 +10,7 @@ from particlesim.jobs import partial_run
 from particlesim.rendering.hud.curve import curve_panel
 from particlesim.rendering.hud.history import History
 from particlesim.rendering.hud.panel import Style
-from particlesim.rendering.shading.colour import encoded
+from particlesim.rendering.shading.colour_maps import encoded
 from tests.worlds import gas, ledger
 
 STYLE = Style((1280, 720), dark=False)

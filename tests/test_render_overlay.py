@@ -15,7 +15,8 @@ from particlesim.rendering.hud.overlay import Overlay, legend_places
 from particlesim.rendering.hud.panel import Panel, Style
 from particlesim.rendering.hud.readout import readout_rows
 from particlesim.rendering.look import look_of
-from particlesim.rendering.shading.colour import PALETTE, encoded, map_colours, palette_colour
+from particlesim.rendering.shading.colour import PALETTE, palette_colour
+from particlesim.rendering.shading.colour_maps import encoded, map_colours
 from particlesim.scene import Scene
 from particlesim.trajectory.analysis.observables import energy_change, pressure
 from particlesim.trajectory.frame_aabb import frame_boxes
@@ -205,7 +206,7 @@ def test_letters_are_large_enough_to_read_in_a_draft():
     assert Style((1920, 1080), dark=False).em > 1.4 * Style((1280, 720), dark=False).em
 
 
-SPEED = {"shape": "sphere", "count": 1, "colour": "by_speed", "colour_range": (0.0, 4.0)}
+SPEED = {"shape": "sphere", "count": 1, "colour": {"field": "speed", "range": (0.0, 4.0)}}
 HEIGHT = {"shape": "sphere", "count": 1, "colour": "by_height"}
 
 
@@ -220,7 +221,7 @@ def test_legends_touch_neither_the_readout_nor_each_other(size):
         for readout in (True, False)
     }
     readout = drawn(
-        make_scene({**SPEED, "colour": "red", "colour_range": None}, size=size),
+        make_scene({**SPEED, "colour": "red"}, size=size),
         make_frame(1, impacts=1, potential=1.0),
     )[0]
     for name, group in groups.items():
@@ -238,7 +239,7 @@ def test_the_bar_of_a_legend_has_the_colours_of_the_map_in_order():
     changed, image = drawn(make_scene(SPEED, readout=False), make_frame())
     colours = image[changed].astype(int)
     for fraction in (0.0, 0.25, 0.5, 0.75, 1.0):
-        wanted = 255.0 * map_colours(np.array([fraction]))[0]
+        wanted = 255.0 * map_colours(np.array([fraction]), "viridis", encoded("#f4f2ee"))[0]
         assert np.abs(colours - wanted).sum(axis=1).min() < 8
 
 

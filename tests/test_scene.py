@@ -35,8 +35,7 @@ size = 0.2
 density = 500
 velocity = [1, 0, 0]
 spin = "rest"
-colour = "by_speed"
-colour_range = [0, 3]
+colour = { field = "speed", map = "magma", range = [0, 3] }
 
 [[particles]]
 name = "two"

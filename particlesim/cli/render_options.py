@@ -52,8 +52,8 @@ def scene_as_asked(scene: Scene, options: RenderOptions, *, of_trajectory: bool)
         camera = _table_or_word("--camera", options.camera)
         scene = _allowed("--camera", None, lambda: replaced(scene, camera=camera))
     if options.colour is not None:
-        colour = options.colour
-        scene = _allowed("--colour", colour, lambda: with_colour(scene, colour))
+        colour = _table_or_word("--colour", options.colour)
+        scene = _allowed("--colour", options.colour, lambda: with_colour(scene, colour))
     return scene
 
 

@@ -171,7 +171,7 @@ class Renderer:
             rows.append(region_lines(scene, width=_CELL_LINE * width))
         if scene.show.cells:
             cells = octree_cells(scene, frame)
-            rows.insert(0, cell_lines(*cells, width=_CELL_LINE * width, begin=self._look.colours.begin))
+            rows.insert(0, cell_lines(*cells, width=_CELL_LINE * width, background=self._environment.background))
         self._lines.put(np.vstack(rows))
 
     def _view_block(self, view: View) -> np.ndarray:

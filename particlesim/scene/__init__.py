@@ -12,6 +12,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from particlesim.scene.base import MAX_COUNT, Model, PlainFloat, Text, whole
 from particlesim.scene.camera import Camera, FixedCamera, Movie, Show
+from particlesim.scene.colours import FieldColour
 from particlesim.scene.errors import SceneError
 from particlesim.scene.fields import ForceField
 from particlesim.scene.flow import Emitter, Sink
@@ -78,10 +79,11 @@ class Scene(Model):
 
     @model_validator(mode="after")
     def _one_scale_for_a_field(self) -> Scene:
-        ranges: dict[str, tuple[float, float]] = {}
+        scales: dict[str, FieldColour] = {}
         for g, group in enumerate(self.groups):
-            if group.colour_range and ranges.setdefault(group.colour, group.colour_range) != group.colour_range:
-                raise ValueError(f"{self.key(g)} has another colour_range for {group.colour} than a group before it")
+            colour = group.colour
+            if isinstance(colour, FieldColour) and scales.setdefault(colour.field, colour) != colour:
+                raise ValueError(f"{self.key(g)}.colour has another scale of {colour.field} than a group before it")
         return self
 
     @model_validator(mode="after")

@@ -12,6 +12,9 @@ from particlesim.scene import Scene
 from particlesim.scene.base import paths_from
 from particlesim.scene.errors import SceneError
 
+# Where groups of particles stand.
+_GROUPS = "particles", "emitters"
+
 # Bytes of a scene file at most, as of a hundred thousand poses: to read 100 MB takes more than a minute.
 _LARGEST = 20_000_000
 
@@ -50,7 +53,15 @@ def parse_scene(table: dict[str, Any], path: str | Path | None = None) -> Scene:
 def stored_scene(table: dict[str, Any]) -> Scene:
     """The scene of a run that was stored: the files that it names were read then and need not be there."""
     with paths_from(None):
-        return Scene(**table)
+        return Scene(**{key: list(map(_of_now, value)) if key in _GROUPS else value for key, value in table.items()})
+
+
+def _of_now(group: dict[str, Any]) -> dict[str, Any]:
+    """A group as this version has it: version 0.1 kept the ends of a scale of colours beside the colour."""
+    kept = {key: value for key, value in group.items() if key != "colour_range"}
+    if group.get("colour_range") is not None:
+        kept["colour"] = {"field": group["colour"].removeprefix("by_"), "range": group["colour_range"]}
+    return kept
 
 
 def _text(path: Path) -> str:

@@ -19,17 +19,16 @@ from particlesim.scene.base import (
     File,
     Model,
     NotNegative,
-    Number,
     Positive,
     PositiveVector,
     Text,
     Vector,
-    colour_or,
     mesh_file,
     shorthand,
     whole,
 )
-from particlesim.scene.messages import listed, must_be, one_of
+from particlesim.scene.colours import COLOUR_WORDS, GroupColour
+from particlesim.scene.messages import must_be, one_of
 from particlesim.scene.placements import AnyOrientation, ListPlacement, Placement, RandomPlacement
 from particlesim.scene.surface import Surface
 
@@ -222,20 +221,6 @@ Velocity = Annotated[_Velocities, _or_vector(_Velocities)]
 Spin = Annotated[_Spins, _or_vector(_Spins)]
 
 
-# Colours that stand for a quantity.
-FIELDS = "by_speed", "by_height", "by_size", "by_impacts"
-_COLOURED = "by_shape", "by_group", *FIELDS
-
-
-def _rising(value: tuple[float, float]) -> tuple[float, float]:
-    if value[0] >= value[1]:
-        raise ValueError("does not rise")
-    return value
-
-
-Range = Annotated[tuple[Number, Number], AfterValidator(_rising), must_be("[low, high], two numbers, low below high")]
-
-
 class Group(Surface):
     """Particles of one shape, one law of sizes, one surface and one start.
 
@@ -254,19 +239,12 @@ class Group(Surface):
     orientation: AnyOrientation = Field(default="random", description="how they are turned at first")
     velocity: Velocity = Field(default_factory=lambda: Rest(kind="rest"), description="how they move at first [m/s]")
     spin: Spin = Field(default_factory=lambda: Rest(kind="rest"), description="how they turn at first [rad/s]")
-    colour: Annotated[Text, colour_or(*_COLOURED)] = Field(
-        default="by_shape", description=f"a colour name, '#rrggbb', or {listed(_COLOURED)}"
-    )
-    colour_range: Range | None = Field(
-        default=None, description="ends of the scale of by_speed and the like; settled by the run if not given"
-    )
+    colour: GroupColour = Field(default="by_shape", description=COLOUR_WORDS)
 
     @model_validator(mode="after")
     def _consistent(self) -> Group:
         if self.density is not None and self.mass is not None:
             raise ValueError("give density or mass, not both")
-        if self.colour_range is not None and self.colour not in FIELDS:
-            raise ValueError(f"colour_range goes with the colours {listed(FIELDS)}")
         if isinstance(self.placement, ListPlacement):
             there = len(self.placement.poses)
             if self.count is not None and self.count != there:

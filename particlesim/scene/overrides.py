@@ -7,6 +7,7 @@ from typing import Any
 
 from particlesim.scene import Scene
 from particlesim.scene.base import MAX_COUNT, Model
+from particlesim.scene.colours import FIELD_WORDS, FieldColour
 from particlesim.scene.file import SceneError, parse_scene
 from particlesim.scene.flow import Emitter
 from particlesim.scene.groups import Group
@@ -35,14 +36,13 @@ def with_movie(scene: Scene, **values: Any) -> Scene:
     return replaced(scene, movie={**dict(scene.movie), **values})
 
 
-def with_colour(scene: Scene, colour: str) -> Scene:
-    """The scene with all particles coloured like this. SceneError if it is no colour."""
-    recoloured = [
-        # A range is one of the field that it was given for.
-        {**dict(group), "colour": colour, "colour_range": group.colour_range if group.colour == colour else None}
-        for group in scene.groups
-    ]
-    return replaced(scene, **grouped(scene, recoloured))
+def with_colour(scene: Scene, colour: Any) -> Scene:
+    """The scene with all particles coloured like this, a word or a table. SceneError if it is no colour."""
+    if isinstance(colour, str) and colour in FIELD_WORDS:
+        # A scale that the scene has for this quantity is kept.
+        own = (group.colour for group in scene.groups if isinstance(group.colour, FieldColour))
+        colour = next((scale for scale in own if scale.field == FIELD_WORDS[colour]), colour)
+    return replaced(scene, **grouped(scene, [{**dict(group), "colour": colour} for group in scene.groups]))
 
 
 def with_look(scene: Scene, other: Scene) -> Scene:
@@ -50,8 +50,7 @@ def with_look(scene: Scene, other: Scene) -> Scene:
     groups = list(scene.groups)
     if len(other.groups) == len(groups):
         groups = [
-            own.model_copy(update={"colour": look.colour, "colour_range": look.colour_range})
-            for own, look in zip(groups, other.groups, strict=True)
+            own.model_copy(update={"colour": look.colour}) for own, look in zip(groups, other.groups, strict=True)
         ]
     return scene.model_copy(update={**grouped(scene, groups), **{key: getattr(other, key) for key in _LOOK}})
 

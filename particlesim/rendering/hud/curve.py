@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 
 from particlesim.core.figure import BLUE, GREEN, GREYS, ORANGE, SKY
 from particlesim.rendering.hud.panel import Panel, Style
-from particlesim.rendering.shading.colour import encoded
+from particlesim.rendering.shading.colour_maps import encoded
 from particlesim.scene import Scene
 from particlesim.trajectory.frames import Ledger
 

@@ -8,16 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.rendering.hud.panel import Panel, Style
-from particlesim.rendering.shading.colour import (
-    ParticleColours,
-    encoded,
-    map_colours,
-    palette_colour,
-    shape_colours,
-)
+from particlesim.rendering.shading.colour import ParticleColours, palette_colour, shape_colours
+from particlesim.rendering.shading.colour_maps import encoded, map_colours
 from particlesim.rendering.shading.fields import Field, figures
 from particlesim.scene import Scene
-from particlesim.scene.groups import FIELDS
+from particlesim.scene.colours import FieldColour
 from particlesim.trajectory.frames import Header
 
 # Width of a scale, height of its bar and of the marks below it, and edge of a swatch, in heights of letters.
@@ -41,7 +36,7 @@ def legend_panels(scene: Scene, header: Header, colours: ParticleColours, style:
     """The legends that the scene wants: a scale for each field; if it asks for legends, the names of colours too."""
     if scene.show.legend is False:
         return []
-    panels = [_scale_panel(field, colours.begin, style) for field in colours.fields]
+    panels = [_scale_panel(field, colours.background, style) for field in colours.fields]
     named = swatches(scene, header, style.can_write) if scene.show.legend else []
     rows = max(1, int(_NAMES * scene.movie.size[1] / style.line))
     return [*panels, _swatch_panel(named, rows, style)] if named else panels
@@ -56,7 +51,7 @@ def swatches(scene: Scene, header: Header, can_write: Callable[[str], bool]) -> 
     of_shapes = np.sqrt(shape_colours(header))
     for number, group in enumerate(scene.groups):
         members = np.flatnonzero(header.group == number)
-        if not len(members) or group.colour in FIELDS:
+        if not len(members) or isinstance(group.colour, FieldColour):
             continue
         name = group.name if group.name and can_write(group.name) else f"group {number + 1}"
         if group.colour == "by_shape":
@@ -74,7 +69,7 @@ def _same(one: Swatch, other: Swatch) -> bool:
     return one.name == other.name and np.array_equal(one.colour, other.colour)
 
 
-def _scale_panel(field: Field, begin: float, style: Style) -> Panel:
+def _scale_panel(field: Field, background: np.ndarray, style: Style) -> Panel:
     """Name and unit, a bar with the colours of the scale, and values in the middle below their marks."""
     em, pad = style.em, style.pad
     width, bar, mark = round(_SCALE * em), round(_BAR * em), max(2, round(_MARK * em))
@@ -84,7 +79,7 @@ def _scale_panel(field: Field, begin: float, style: Style) -> Panel:
     # At both ends there is room for half of the value there.
     left, right = (style.width(text) // 2 for _, text in (labels[0], labels[-1]))
     start, top, width = pad + left, pad + style.line, width - left - right
-    colours = 255.0 * map_colours(np.linspace(0.0, 1.0, width), begin)
+    colours = 255.0 * map_colours(np.linspace(0.0, 1.0, width), field.map, background)
     panel.fill(np.tile(colours, (bar, 1, 1)), start, top)
     thick = max(1, round(0.08 * em))
     for middle, text in _apart(labels, field, width - 1, style):

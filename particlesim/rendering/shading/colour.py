@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from PIL import ImageColor
 
-from particlesim.rendering.shading.fields import field_of
+from particlesim.rendering.shading.colour_maps import encoded, map_colours
+from particlesim.rendering.shading.fields import field_colours, field_of
 from particlesim.scene import Scene
-from particlesim.scene.groups import FIELDS
+from particlesim.scene.colours import FIELDS, FieldColour
 from particlesim.trajectory.frames import Frame, Header
 
 # Eight colours that colour-blind people tell apart: M. Okabe and K. Ito, "Color Universal Design" (2008), less black.
@@ -20,24 +20,6 @@ _MIXED_IN = (0.0, -0.45, 0.5, -0.7, 0.75)
 
 # Each shape keeps its colour from movie to movie; meshes and second shapes of a name take what is left.
 _SHAPE_COLOUR = {"sphere": 0, "cube": 1, "pyramid": 2, "tetrahedron": 4, "box": 3}
-
-# Nine evenly spaced values of the map 'viridis' of S. van der Walt and N. Smith (2015, public domain), whose
-# lightness grows evenly.
-_FIELD_MAP = (
-    "#440154", "#472D7B", "#3B528B", "#2C728E", "#21918C", "#28AE80", "#5EC962", "#ADDC30", "#FDE725",
-)  # fmt: skip
-
-
-# Colours of the map have at least this contrast with a dark background: (L + 0.05) / (L' + 0.05), as in WCAG 2.2.
-_CONTRAST, _FLARE = 2.5, 0.05
-
-# More of the map than this is not left out for it.
-_MOST_LEFT_OUT = 0.4
-
-
-def encoded(colour: str) -> np.ndarray:
-    """A colour name or '#rrggbb' as sRGB 0 .. 1, (3,) float64."""
-    return np.array(ImageColor.getrgb(colour)[:3]) / 255.0
 
 
 def parse(colour: str) -> np.ndarray:
@@ -55,55 +37,32 @@ def palette_colour(number: int) -> np.ndarray:
 class ParticleColours:
     """Colours for the frames of one movie. The scales of fields are settled by some of its frames, and kept.
 
-    ``fields``: those that particles are coloured by; ``begin``: see ``map_colours``.
+    ``fields``: those that particles are coloured by; ``background``: sRGB 0 .. 1 (3,), that scales stand off from.
     """
 
     def __init__(self, scene: Scene, header: Header, frames: Sequence[Frame]) -> None:
         self._header = header
-        self.begin = map_begin(encoded(scene.movie.background))
-        # In linear light, fine enough that no step of 8 bits is left out.
-        self._map = (map_colours(np.linspace(0.0, 1.0, 1024), self.begin) ** 2).astype(np.float32)
+        self.background = encoded(scene.movie.background)
         self._fixed = fixed_colours(scene, header)
-        kinds = [kind for kind in FIELDS if any(group.colour == kind for group in scene.groups)]
-        self.fields = [field_of(kind, scene, header, frames) for kind in kinds]
+        shown = {colour.field: colour for colour in reversed(field_colours(scene)) if colour is not None}
+        kinds = [kind for kind in FIELDS if kind in shown]
+        self.fields = [field_of(shown[kind], scene, header, frames) for kind in kinds]
+        # In linear light, fine enough that no step of 8 bits is left out.
+        even = np.linspace(0.0, 1.0, 1024)
+        self._maps = [(map_colours(even, field.map, self.background) ** 2).astype(np.float32) for field in self.fields]
         # Which of the fields a particle is coloured by, or -1.
-        number = {kind: k for k, kind in enumerate(kinds)}
-        self._field = np.array([number.get(group.colour, -1) for group in scene.groups])[header.group]
+        number = [-1 if colour is None else kinds.index(colour.field) for colour in field_colours(scene)]
+        self._field = np.array(number)[header.group]
 
     def __call__(self, frame: Frame, members: np.ndarray) -> np.ndarray:
         """Linear RGB (k, 3) float32 of the particles whose ids are ``members`` (k,)."""
         colours = self._fixed[members]
-        for number, field in enumerate(self.fields):
+        for number, (field, colour) in enumerate(zip(self.fields, self._maps, strict=True)):
             mine = self._field[members] == number
             fraction = field.fractions(self._header, frame, members[mine])
-            last = len(self._map) - 1
-            colours[mine] = self._map[np.clip(np.rint(fraction * last), 0, last).astype(int)]
+            last = len(colour) - 1
+            colours[mine] = colour[np.clip(np.rint(fraction * last), 0, last).astype(int)]
         return colours
-
-
-def map_colours(fraction: np.ndarray, begin: float = 0.0) -> np.ndarray:
-    """sRGB 0 .. 1 (n, 3) of numbers (n,) 0 .. 1, in colours whose lightness grows with the number.
-
-    The first part of the map, up to ``begin``, is left out.
-    """
-    anchors = np.array([encoded(colour) for colour in _FIELD_MAP])
-    place = np.linspace(0.0, 1.0, len(anchors))
-    at = begin + (1.0 - begin) * np.asarray(fraction)
-    return np.column_stack([np.interp(at, place, channel) for channel in anchors.T])
-
-
-def map_begin(background: np.ndarray) -> float:
-    """How much of the map is to be left out: what can hardly be seen on a ``background``, sRGB 0 .. 1 (3,)."""
-    part = np.linspace(0.0, _MOST_LEFT_OUT, 64)
-    contrast = (luminance(map_colours(part)) + _FLARE) / (luminance(background[None]) + _FLARE)
-    # On what is light all of the map is seen; on what is as light as its middle no part of it would help.
-    return float(part[np.argmax(contrast >= _CONTRAST)]) if contrast[-1] >= _CONTRAST else 0.0
-
-
-def luminance(colours: np.ndarray) -> np.ndarray:
-    """Relative luminance 0 .. 1 (n,) of sRGB colours 0 .. 1 (n, 3), as WCAG 2.2 has it."""
-    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
-    return linear @ np.array([0.2126, 0.7152, 0.0722])
 
 
 def shape_colours(header: Header) -> np.ndarray:
@@ -127,7 +86,7 @@ def fixed_colours(scene: Scene, header: Header) -> np.ndarray:
     colours = np.zeros((len(header.group), 3), dtype=np.float32)
     for number, group in enumerate(scene.groups):
         members = header.group == number
-        if group.colour == "by_shape" or group.colour in FIELDS:
+        if group.colour == "by_shape" or isinstance(group.colour, FieldColour):
             colours[members] = by_shape[header.shape[members]]
         elif group.colour == "by_group":
             colours[members] = palette_colour(number) ** 2

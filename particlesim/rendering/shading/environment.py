@@ -6,7 +6,7 @@ import numpy as np
 
 from particlesim.rendering.camera import View
 from particlesim.rendering.gl import geometry
-from particlesim.rendering.shading.colour import encoded
+from particlesim.rendering.shading.colour_maps import encoded
 from particlesim.rendering.shading.lighting import towards_light
 from particlesim.rendering.shading.shade_floor import Ground
 from particlesim.scene import Scene

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.scene import Scene
+from particlesim.scene.colours import FieldColour
 from particlesim.scene.groups import Group
 from particlesim.scene.overrides import grouped
 from particlesim.trajectory.frames import Frame, Header
@@ -30,6 +31,7 @@ class Field(NamedTuple):
     unit: str
     low: float
     high: float
+    map: str  # of colours, see colour_maps.py
     values: Callable[[Header, Frame, np.ndarray], np.ndarray]  # of particles by their ids
 
     def fractions(self, header: Header, frame: Frame, members: np.ndarray) -> np.ndarray:
@@ -37,27 +39,32 @@ class Field(NamedTuple):
         return (self.values(header, frame, members) - self.low) / (self.high - self.low)
 
 
+def field_colours(scene: Scene) -> list[FieldColour | None]:
+    """How each group shows a quantity, None for those that do not."""
+    return [group.colour if isinstance(group.colour, FieldColour) else None for group in scene.groups]
+
+
 def is_settled_by_frames(scene: Scene) -> bool:
     """Whether a scale of the scene depends on how its particles fare."""
-    return any(group.colour in _CHANGING and group.colour_range is None for group in scene.groups)
+    return any(colour and colour.field in _CHANGING and colour.range is None for colour in field_colours(scene))
 
 
-def field_of(kind: str, scene: Scene, header: Header, frames: Sequence[Frame]) -> Field:
-    """The field of a colour such as by_speed; its scale is the scene's, or settled by some frames."""
-    name, unit, values, scale = _FIELDS[kind]
-    ranges = (g.colour_range for g in scene.groups if g.colour == kind and g.colour_range)
-    low, high = next(ranges, None) or scale(scene, header, frames)
-    return Field(name, unit, float(low), float(high), values)
+def field_of(colour: FieldColour, scene: Scene, header: Header, frames: Sequence[Frame]) -> Field:
+    """The field that a colour shows; its scale is the scene's, or settled by some frames."""
+    unit, values, scale = _FIELDS[colour.field]
+    low, high = colour.range or scale(scene, header, frames)
+    return Field(colour.field, unit, float(low), float(high), colour.map, values)
 
 
 def settled(scene: Scene, header: Header, frames: Sequence[Frame]) -> Scene:
     """The scene with the scales that ``frames`` settle, in the order of time, as if it said them."""
 
     def with_range(group: Group) -> Group:
-        if group.colour not in _CHANGING:
+        colour = group.colour
+        if not isinstance(colour, FieldColour) or colour.field not in _CHANGING:
             return group
-        field = field_of(group.colour, scene, header, frames)
-        return group.model_copy(update={"colour_range": (field.low, field.high)})
+        field = field_of(colour, scene, header, frames)
+        return group.model_copy(update={"colour": colour.model_copy(update={"range": (field.low, field.high)})})
 
     return scene.model_copy(update=grouped(scene, [with_range(group) for group in scene.groups]))
 
@@ -143,13 +150,13 @@ def _impact_scale(scene: Scene, header: Header, frames: Sequence[Frame]) -> tupl
     return _rounded(0.0, max(1.0, _reached(_impacts, header, frames[-1:])))
 
 
-# Colours whose scales are settled by frames.
-_CHANGING = "by_speed", "by_height", "by_impacts"
+# Fields whose scales are settled by frames.
+_CHANGING = "speed", "height", "impacts"
 
-# Name, unit, values and scale of each. Sizes are factors on shapes of 1 m, hence metres.
+# Unit, values and scale of each. Sizes are factors on shapes of 1 m, hence metres.
 _FIELDS = {
-    "by_speed": ("speed", "m/s", _speeds, _speed_scale),
-    "by_height": ("height", "m", _heights, _height_scale),
-    "by_size": ("size", "m", _sizes, _size_scale),
-    "by_impacts": ("impacts", "", _impacts, _impact_scale),
+    "speed": ("m/s", _speeds, _speed_scale),
+    "height": ("m", _heights, _height_scale),
+    "size": ("m", _sizes, _size_scale),
+    "impacts": ("", _impacts, _impact_scale),
 }
