@@ -200,9 +200,9 @@ BROKEN = [
     ),
     (
         GOOD + '[movie]\nquality = "hihg"\n',
-        "movie.quality = \"hihg\": must be 'draft', 'normal' or 'high'; did you mean 'high'?",
+        "movie.quality = \"hihg\": must be 'draft', 'normal', 'high' or 'best'; did you mean 'high'?",
     ),
-    (GOOD + "[movie]\nquality = 1\n", "movie.quality = 1: must be 'draft', 'normal' or 'high'"),
+    (GOOD + "[movie]\nquality = 1\n", "movie.quality = 1: must be 'draft', 'normal', 'high' or 'best'"),
     (GOOD + "[movie]\ncrf = 52\n", "movie.crf = 52: must be a whole number from 0 (lossless) to 51 (smallest)"),
     (GOOD + "[movie]\nspeed = 0\n", "movie.speed = 0: must be a number of seconds above 0"),
     (GOOD + "[movie]\nfade = -1\n", "movie.fade = -1: must be a number of seconds of 0 or more"),

@@ -64,7 +64,7 @@ WRONG = [
         "the nearest are 322 and 64",
     ),
     (["--size", "9x64"], "--size 9x64: must be [width, height] in pixels, two even whole numbers from 64 to 7680"),
-    (["--quality", "hihg"], "--quality hihg: must be 'draft', 'normal' or 'high'; did you mean 'high'?"),
+    (["--quality", "hihg"], "--quality hihg: must be 'draft', 'normal', 'high' or 'best'; did you mean 'high'?"),
     (["--camera", "orbital"], "--camera: camera = \"orbital\": unknown kind; did you mean 'orbit'?"),
     (["--camera", "{kind = 'look-at'}"], "--camera: camera: the key 'position' is missing"),
     (["--camera", "{kind ="], "--camera: not valid TOML: Invalid value (at end of document)"),

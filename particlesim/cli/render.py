@@ -49,7 +49,7 @@ def render(
     ] = None,
     quality: Annotated[
         str | None,
-        typer.Option("--quality", metavar="WORD", help="draft (640x360), normal (1280x720), high (1920x1080)."),
+        typer.Option("--quality", metavar="WORD", help="draft (640x360), normal (1280x720), high or best (1920x1080)."),
     ] = None,
     size: Annotated[
         str | None, typer.Option("--size", metavar="WIDTHxHEIGHT", help="Size of the pictures in pixels.")

@@ -12,6 +12,7 @@ from particlesim.rendering.hud.history import History
 from particlesim.rendering.hud.overlay import Overlay
 from particlesim.rendering.look import Look
 from particlesim.rendering.octree_cells import cell_lines, octree_cells
+from particlesim.rendering.passes import Pass, mean_of, passes_of
 from particlesim.rendering.quality import PRESETS
 from particlesim.rendering.regions import region_lines
 from particlesim.rendering.scenery import Scenery
@@ -19,7 +20,8 @@ from particlesim.rendering.shading.ambient_occlusion import AmbientOcclusion
 from particlesim.rendering.shading.environment import Environment
 from particlesim.rendering.shading.floor import FloorOcclusion
 from particlesim.rendering.shading.fxaa import fxaa
-from particlesim.rendering.shading.lighting import Lighting, key_light
+from particlesim.rendering.shading.lighting import Light, Lighting, key_light, lights_from
+from particlesim.rendering.shading.pixel_light import LightMaps, all_around, disc_of_lamps, light_maps
 from particlesim.rendering.shading.shade import Paint, Seen, seen_instances, shade
 from particlesim.rendering.shading.shadow import shadow_map
 from particlesim.rendering.visibility.instances import Instances, instances_of
@@ -35,6 +37,14 @@ _CELL_LINE = 0.8
 # Triangles cast shadows from so many texels of the shadow map behind them: what is lit at a slant is looked for in
 # some texels about it, and must not be in the shadow of itself.
 _TRIANGLES_BEHIND = 4.0
+
+
+# How wide the key light is [rad], where shadows are those of a lamp with a size: some ten times as wide as the sun.
+_LAMP = 0.1
+
+# Texels in a usual particle's radius of what the points of that lamp see, and of what directions of the sky see; along
+# a side of the latter's maps there are at most so many, and of the former's as many as the picture is high.
+_LAMP_TEXELS, _SKY_TEXELS, _SKY_MAP = 15.0, 6.0, 640
 
 
 class Renderer:
@@ -57,10 +67,11 @@ class Renderer:
         tables = self._scenery.tables
         usual = float(np.median(tables.radius)) if len(tables.radius) else 0.0
         self._light = key_light(scene, round(quality.shadow * self._size[1]), usual)
-        self._ambient_occlusion = (
-            AmbientOcclusion(np.asarray(scene.world.size), tables.radius) if quality.ambient_occlusion else None
-        )
-        shaded = environment.has_floor and quality.ambient_occlusion
+        self._usual = usual
+        # Where each pixel asks the sky, bodies and the floor need not.
+        shaded = quality.ambient_occlusion and not quality.sky
+        self._ambient_occlusion = AmbientOcclusion(np.asarray(scene.world.size), tables.radius) if shaded else None
+        shaded = shaded and environment.has_floor
         self._floor = FloorOcclusion(*environment.floor, tables.inradius, tables.radius) if shaded else None
         self._lines = bridge.Lines()
         self._canvas = bridge.Canvas(found, self._size, self._lines, quality.samples)
@@ -95,44 +106,70 @@ class Renderer:
         particles = instances_of(self._look.scene, self._look.header, frame, self._scenery.tables)
         instances = self._scenery.amid(particles, frame.time)
         clusters = occlusion_clusters(instances.position, instances.tables.radius)
-        projection = self._projection(view)
-        buffer = rasterise(projection, instances, clusters)
-        shadow = shadow_map(self._seen_by_light(instances, clusters))
-        paint = self._paint(view, frame, (particles, instances), seen_instances(buffer, len(instances.position)))
-        self._put_lines(view, frame)
-        lighting = self._light.in_view(projection, shadow)
+        shadow = shadow_map(self._seen_by(self._light, instances, clusters))
         ground = self._environment.ground(self._floor_light(particles))
-        colours = shade(projection, buffer, instances, paint, lighting, ground)
-        if len(self._scenery.clear):
-            colours = self._behind_panes(colours, buffer, view, frame.time, lighting)
-        # The floor, which is seen from above only, hides no line: those on it would be dashes.
-        depth = np.maximum(buffer.inverse_depth, 0.0)
-        depth *= np.float32(-view.near)
-        depth += np.float32(1.0)
-        drawn = self._canvas.draw(self._bridge.Picture(self._view_block(view), colours, depth))
+        self._put_lines(view, frame)
+
+        def drawn(one: Pass) -> np.ndarray:
+            projection = self._projection(view, one)
+            buffer = rasterise(projection, instances, clusters)
+            paint = self._paint(view, frame, (particles, instances), seen_instances(buffer, len(instances.position)))
+            lighting = self._light.in_view(projection, shadow)
+            maps = self._light_maps(projection, instances, clusters, one) if self._quality.sky else None
+            colours = shade(projection, buffer, instances, paint, lighting, ground, maps)
+            if len(self._scenery.clear):
+                colours = self._behind_panes(colours, buffer, view, frame.time, lighting, projection)
+            # The floor, which is seen from above only, hides no line: those on it would be dashes.
+            depth = np.maximum(buffer.inverse_depth, 0.0)
+            depth *= np.float32(-view.near)
+            depth += np.float32(1.0)
+            return self._canvas.draw(self._bridge.Picture(self._view_block(view, projection), colours, depth))
+
         # OpenGL's first row is the lowest, and it has a fourth channel.
-        image = fxaa(drawn) if self._quality.fxaa else np.ascontiguousarray(drawn[::-1, :, :3])
+        picture = mean_of(map(drawn, passes_of(self._quality.passes)))
+        image = fxaa(picture) if self._quality.fxaa else np.ascontiguousarray(picture[::-1, :, :3])
         self._overlay.draw(image, frame, history or History())
         return image
 
-    def _seen_by_light(self, instances: Instances, clusters: OcclusionClusters) -> np.ndarray:
-        """How close to the light what its map shows is, (h, w) float32 [m]."""
-        light = self._light
+    def _light_maps(
+        self, view: Projection, instances: Instances, clusters: OcclusionClusters, one: Pass
+    ) -> tuple[LightMaps, LightMaps]:
+        """What the points of the lamp see, and the directions of the sky."""
+        quality, scene = self._quality, self._look.scene
+        lamps = disc_of_lamps(self._light.towards, quality.lamps, _LAMP, one.turn)
+        sky = all_around(quality.sky, one.lift, one.turn)
+        each = [
+            lights_from(towards, scene, pixels, self._usual / texels)
+            for towards, pixels, texels in ((lamps, self._size[1], _LAMP_TEXELS), (sky, _SKY_MAP, _SKY_TEXELS))
+        ]
+        of_lamps, of_sky = (
+            light_maps(lights, [self._seen_by(light, instances, clusters) for light in lights], view) for lights in each
+        )
+        return of_lamps, of_sky
+
+    def _seen_by(self, light: Light, instances: Instances, clusters: OcclusionClusters) -> np.ndarray:
+        """How close to a light what its map shows is, (h, w) float32 [m]."""
         casting = self._scenery.casting(instances, _TRIANGLES_BEHIND / light.projection.scale * light.axes[2])
         if casting is not instances:
             clusters = occlusion_clusters(casting.position, casting.tables.radius)
         return rasterise(light.projection, casting, clusters).inverse_depth
 
-    def _projection(self, view: View) -> Projection:
+    def _projection(self, view: View, one: Pass) -> Projection:
         slope = float(np.tan(0.5 * view.field_of_view))
         axes = view.pose[:3, :3].T * np.array([[1.0], [1.0], [-1.0]])
-        return Projection(axes, view.pose[:3, 3], False, 0.5 * self._drawn_size[1] / slope, self._drawn_size)
+        return Projection(axes, view.pose[:3, 3], False, 0.5 * self._drawn_size[1] / slope, self._drawn_size, one.shift)
 
     def _behind_panes(
-        self, colours: np.ndarray, buffer: VisibilityBuffer, view: View, time: float, lighting: Lighting
+        self,
+        colours: np.ndarray,
+        buffer: VisibilityBuffer,
+        view: View,
+        time: float,
+        lighting: Lighting,
+        projection: Projection,
     ) -> np.ndarray:
         """The picture with the obstacles that one sees through before it; they cast no shadows."""
-        scenery, projection = self._scenery, self._projection(view)
+        scenery = self._scenery
         panes = scenery.instances(scenery.clear, time)
         seen = rasterise(projection, panes, occlusion_clusters(panes.position, panes.tables.radius))
         which = seen_instances(seen, len(panes.position))
@@ -174,7 +211,7 @@ class Renderer:
             rows.insert(0, cell_lines(*cells, width=_CELL_LINE * width, background=self._environment.background))
         self._lines.put(np.vstack(rows))
 
-    def _view_block(self, view: View) -> np.ndarray:
+    def _view_block(self, view: View, through: Projection) -> np.ndarray:
         """The uniform block of shaders/line.vert, float32."""
         width, height = self._drawn_size
         _, _, back, eye = view.pose[:3].T
@@ -182,6 +219,7 @@ class Renderer:
         projection = np.zeros((4, 4))
         projection[0, 0] = height / (slope * width)
         projection[1, 1] = 1.0 / slope
+        projection[:2, 2] = np.multiply(-2.0, through.shift) / self._drawn_size
         # Without a far plane: particles of an open world are drawn however far they fly.
         projection[2, 2:] = -1.0, -2.0 * view.near
         projection[3, 2] = -1.0

@@ -148,10 +148,15 @@ def _sizes(value: Any, accept: Callable[[Any], Any]) -> Any:
 
 
 Resolution = Annotated[tuple[Pixels, Pixels], WrapValidator(_sizes)]
-Quality = Annotated[Literal["draft", "normal", "high"], one_of("draft", "normal", "high")]
+Quality = Annotated[Literal["draft", "normal", "high", "best"], one_of("draft", "normal", "high", "best")]
 
 # Width and height of pictures that do not say theirs [pixels].
-_SIZES: dict[str, tuple[int, int]] = {"draft": (640, 360), "normal": (1280, 720), "high": (1920, 1080)}
+_SIZES: dict[str, tuple[int, int]] = {
+    "draft": (640, 360),
+    "normal": (1280, 720),
+    "high": (1920, 1080),
+    "best": (1920, 1080),
+}
 
 
 class Movie(Model):
@@ -164,7 +169,8 @@ class Movie(Model):
         default=1.0, description="seconds of the scene in one of the movie: 0.1 is slow motion"
     )
     quality: Quality = Field(
-        default="normal", description="draft is 640 x 360, normal 1280 x 720, high 1920 x 1080 with smoother edges"
+        default="normal",
+        description="draft is 640 x 360, normal 1280 x 720, high and best 1920 x 1080 with soft light and shadows",
     )
     resolution: Resolution | None = Field(
         default=None, description="[width, height], even; by the quality if not given [pixels]"

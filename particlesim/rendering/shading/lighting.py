@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -85,11 +86,31 @@ def key_light(scene: Scene, pixels: int, radius: float = 0.0) -> Light:
     ``radius`` of a usual particle [m]: where it is large, so are the texels.
     """
     towards = towards_light(scene)
-    right = np.array([-towards[1], towards[0], 0.0]) / np.hypot(*towards[:2])
-    axes = np.array([right, np.cross(towards, right), -towards])
-    reach = _ROOM * np.abs(axes) @ (0.5 * np.asarray(scene.world.size))
+    axes, reach = _axes_and_reach(towards, scene.world.size)
     # Texels are squares in the world: the shorter side has fewer of them, and reaches as far as whole ones do.
     texel = max(2.0 * max(reach[:2]) / pixels, _PENUMBRA * radius / SQUARES)
     sides = np.maximum(np.ceil(2.0 * reach[:2] / texel - 1e-9).astype(int), _FEWEST)
     reach[:2] = 0.5 * texel * sides
     return Light(towards, axes, reach, (int(sides[0]), int(sides[1])))
+
+
+def lights_from(directions: np.ndarray, scene: Scene, pixels: int, texel: float) -> list[Light]:
+    """Lights from several directions (k, 3), all with square maps of one size, of up to ``pixels`` along a side.
+
+    Texels are no smaller than ``texel`` [m].
+    """
+    found = [_axes_and_reach(towards, scene.world.size) for towards in directions]
+    widest = max(float(max(reach[:2])) for _, reach in found)
+    side = int(np.clip(np.ceil(2.0 * widest / max(texel, 1e-9 * widest)), _FEWEST, pixels))
+    lights = []
+    for towards, (axes, reach) in zip(directions, found, strict=True):
+        reach[:2] = max(reach[:2])
+        lights.append(Light(towards, axes, reach, (side, side)))
+    return lights
+
+
+def _axes_and_reach(towards: np.ndarray, size: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    """The axes of a light, and how far along them the box reaches that it shows, each way [m]."""
+    right = np.array([-towards[1], towards[0], 0.0]) / np.hypot(*towards[:2])
+    axes = np.array([right, np.cross(towards, right), -towards])
+    return axes, _ROOM * np.abs(axes) @ (0.5 * np.asarray(size))

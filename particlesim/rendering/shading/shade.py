@@ -12,22 +12,22 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
-from particlesim.core.math3d import axpy, load_vec3, norm, scale, sub
+from particlesim.core.math3d import load_vec3
 from particlesim.core.parallel import ThreadTeam
 from particlesim.rendering.shading.faces_in_view import faces_in_view
 from particlesim.rendering.shading.lighting import Lighting
+from particlesim.rendering.shading.pixel_light import LightMaps, pixel_light
 from particlesim.rendering.shading.pixel_row import PixelRow, row_buffers
+from particlesim.rendering.shading.runs import round_form, run_from, seen_span
 from particlesim.rendering.shading.shade_face import find_rim, shade_face
 from particlesim.rendering.shading.shade_floor import Ground, find_floor, floor_form, shade_floor, shade_nothing
 from particlesim.rendering.shading.shade_round import shade_round
 from particlesim.rendering.shading.shadow import light_row
-from particlesim.rendering.visibility.geometry_tables import BALL, FACETED, drawn_as
+from particlesim.rendering.visibility.geometry_tables import FACETED
 from particlesim.rendering.visibility.instances import Instances
 from particlesim.rendering.visibility.projection import Projection
 from particlesim.rendering.visibility.rasterise import VisibilityBuffer
-from particlesim.rendering.visibility.scan_lines import in_view, rotated, view_rotation
-
-_NOWHERE = 0.0, 0.0, 0.0
+from particlesim.rendering.visibility.scan_lines import in_view
 
 
 class Seen(NamedTuple):
@@ -77,16 +77,22 @@ def shade(
     paint: Paint,
     lighting: Lighting,
     ground: Ground,
+    maps: tuple[LightMaps, LightMaps] | None = None,
 ) -> np.ndarray:
-    """The picture, (height, width, 4) uint8 sRGB, its first row the lowest and its fourth channel full."""
+    """The picture, (height, width, 4) uint8 sRGB, its first row the lowest and its fourth channel full.
+
+    ``maps``: of the points of a lamp and of the sky, whose light is then found for each pixel; ``lighting`` has but one
+    map of the key light, and the colours of ``paint`` a share of the sky's.
+    """
     height, width = buffer.id.shape
     pixels = np.empty((height, width), dtype=np.int32)
     faces = faces_in_view(instances, paint.seen.indices, projection)
     world = instances.position, instances.orientation, instances.tables, paint, faces
     strip = projection.strip(0, width)
+    light = None if maps is None else pixel_light(strip, buffer, world, ground, *maps)
 
     def fill(_: int, first: int, last: int) -> None:
-        _shade_rows((first, last), strip, buffer, world, lighting, ground, pixels)
+        _shade_rows((first, last), strip, buffer, world, lighting, ground, light, pixels)
 
     team = ThreadTeam(pixels.size)
     # Rows of the sky take less work than others.
@@ -112,7 +118,7 @@ def _list_instances(ids, number, indices):
 
 
 @entry_kernel
-def _shade_rows(rows, strip, buffer, world, lighting, ground, pixels):
+def _shade_rows(rows, strip, buffer, world, lighting, ground, light, pixels):
     strip, buffer, world = without_refcounts(strip), without_refcounts(buffer), without_refcounts(world)
     lighting, ground, pixels = without_refcounts(lighting), without_refcounts(ground), without_refcounts(pixels)
     width = pixels.shape[1]
@@ -124,56 +130,38 @@ def _shade_rows(rows, strip, buffer, world, lighting, ground, pixels):
     for number in range(rows[0], rows[1]):
         y = (number + 0.5 - strip.middle_y) / strip.scale
         find_floor(y, strip, ground, buffer.inverse_depth[number], row)
-        light_row(_seen_span(row.close), y, lighting, row)
+        if light is None:
+            light_row(seen_span(row.close), y, lighting, row)
+        else:
+            row.lit[:] = light.lit[number]
+        out = pixels[number], _sky_row(light, number)
         first = 0
         while first < width:
-            last, kind = _run(buffer, number, first, row.close, world[2])
-            span, out = (first, last, y), pixels[number]
+            last, kind = run_from(buffer, number, first, row.close, world[2])
+            span = first, last, y
             if kind >= 0:
                 which = buffer.id[number, first], buffer.primitive[number, first], kind
                 _shade_instance(span, which, strip, world, lighting, ground.colours[0], row, out)
             elif row.close[first] > 0.0:
-                shade_floor(span, number, to_floor, ground, row, out)
+                shade_floor(span, number, to_floor, ground, row, out[0], out[1])
             else:
-                shade_nothing(span, ground, out)
+                shade_nothing(span, ground, pixels[number])
             first = last
 
 
 @kernel
-def _seen_span(close):
-    """The first pixel of a row that sees something, and past the last."""
-    first, last = 0, len(close)
-    while first < last and close[first] <= 0.0:
-        first += 1
-    while first < last and close[last - 1] <= 0.0:
-        last -= 1
-    return first, last
+def _sky_row(light, number):
+    """The share of the light from everywhere that reaches each pixel of a row, None where that is not known."""
+    if light is None:
+        return None
+    return light.sky[number]
 
 
 @kernel
-def _run(buffer, number, first, close, tables):
-    """Past the last pixel of a row that sees the same as ``first``, and how that is drawn, -1 if by no instance."""
-    ids, primitive = buffer.id[number], buffer.primitive[number]
-    i, p, last = ids[first], primitive[first], first + 1
-    if i < 0:
-        nothing = close[first] <= 0.0
-        while last < len(ids) and ids[last] < 0 and (close[last] <= 0.0) == nothing:
-            last += 1
-        return last, -1
-    kind = drawn_as(tables.shapes.shape[tables.body[i].shape])
-    if kind == BALL:  # of which there is one primitive
-        while last < len(ids) and ids[last] == i:
-            last += 1
-    else:
-        while last < len(ids) and ids[last] == i and primitive[last] == p:
-            last += 1
-    return last, kind
-
-
-@kernel
-def _shade_instance(span, which, strip, world, lighting, background, row, pixels):
+def _shade_instance(span, which, strip, world, lighting, background, row, out):
     """Shade a run of pixels that see the same primitive; ``which``: instance, primitive, and how it is drawn."""
-    position, orientation, tables, paint, faces = world
+    position, _, _, paint, faces = world
+    pixels, sky = out
     i, p, kind = which
     centre = in_view(strip, load_vec3(position, i))
     number, haze = paint.seen.number[i], paint.haze
@@ -182,30 +170,7 @@ def _shade_instance(span, which, strip, world, lighting, background, row, pixels
     if kind == FACETED:
         face = faces.face[faces.start[number] + p]
         find_rim(span, face, faces.edge, row)
-        shade_face(span, face, colour, lighting, background, row, pixels)
+        shade_face(span, face, colour, lighting, background, row, pixels, sky)
         return
-    if kind == BALL:
-        form = centre, _NOWHERE, 1.0 / tables.radius[i], _NOWHERE
-    else:
-        placed = tables.body[i].shape, tables.body[i].size, centre, view_rotation(strip.axes, orientation, i)
-        form = _rounded_form(placed, p, tables.shapes)
-    shade_round(span, form, colour, lighting, background, row, pixels)
-
-
-@kernel
-def _rounded_form(placed, p, shapes):
-    """What ``shade_round`` wants of a part of a rounded shape: an offset face, a cylinder or a sphere."""
-    number, size, centre, m = placed
-    shape = shapes.shape[number]
-    faces, edges = shape.last_face - shape.first_face, shape.last_edge - shape.first_edge
-    if p < faces:
-        return centre, _NOWHERE, 0.0, rotated(m, shapes.face[shape.first_face + p].normal)
-    bend, axis = 1.0 / (shape.rounding * size), _NOWHERE
-    if p < faces + edges:
-        edge = shapes.edge[shape.first_edge + p - faces]
-        vertex = edge[0]
-        axis = sub(rotated(m, load_vec3(shapes.vertex, edge[1])), rotated(m, load_vec3(shapes.vertex, vertex)))
-        axis = scale(axis, 1.0 / norm(axis))
-    else:
-        vertex = shape.first_vertex + p - faces - edges
-    return axpy(centre, rotated(m, load_vec3(shapes.vertex, vertex)), size), axis, bend, _NOWHERE
+    form = round_form(which, centre, strip, world)
+    shade_round(span, form, colour, lighting, background, row, pixels, sky)

@@ -14,10 +14,10 @@ _SLOPE = np.float32(0.75)  # over one and a third pixels
 
 
 @kernel
-def shade_face(span, face, paint, lighting, background, row, pixels):
+def shade_face(span, face, paint, lighting, background, row, pixels, sky):
     """Shade some pixels of a row, ``pixels`` (width,) int32, of which ``row.share`` says how much they show the rim.
 
-    ``span``: the first, past the last; ``face``: FACE_IN_VIEW; ``paint``: as for ``shade_round``.
+    ``span``: the first, past the last; ``face``: FACE_IN_VIEW; ``paint``, ``sky``: as for ``shade_round``.
     """
     first, last, _ = span
     normal, facing = single(face.normal), face.facing
@@ -31,11 +31,13 @@ def shade_face(span, face, paint, lighting, background, row, pixels):
     b, bk = blue * share * ambient(2, upward, facing), blue * KEY[2] * towards
     lit, rim, out = row.lit[first:last], row.share[first:last], pixels[first:last]
     for k in range(len(out)):
-        key, left = lit[k], ONE - _DARKER * rim[k]
+        key, left, reaching = lit[k], ONE - _DARKER * rim[k], ONE
+        if sky is not None:
+            reaching = sky[first + k]
         out[k] = packed(
-            left * encode(r + key * rk, back[0], haze),
-            left * encode(g + key * gk, back[1], haze),
-            left * encode(b + key * bk, back[2], haze),
+            left * encode(r * reaching + key * rk, back[0], haze),
+            left * encode(g * reaching + key * gk, back[1], haze),
+            left * encode(b * reaching + key * bk, back[2], haze),
         )
 
 

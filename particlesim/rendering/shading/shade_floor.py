@@ -18,6 +18,9 @@ _STEP = np.float32(1.0 / 255.0)
 
 _TINY = np.float32(1e-12)
 
+# The light from everywhere at the floor, as a share of all its light.
+_AMBIENT = np.float32(0.4)
+
 
 class Ground(NamedTuple):
     """The background, and the floor before it, which is seen from above only: from below one looks through it.
@@ -71,10 +74,11 @@ def find_floor(y, strip, ground, seen, row):
 
 
 @kernel
-def shade_floor(span, number, to_map, ground, row, pixels):
+def shade_floor(span, number, to_map, ground, row, pixels, shares):
     """Shade some pixels of a row, ``pixels`` (width,) int32, that see the floor.
 
-    ``span``: the first, past the last, y of their rays; ``number`` of the row; ``to_map``: see ``floor_form``.
+    ``span``: the first, past the last, y of their rays; ``number`` of the row; ``to_map``: see ``floor_form``;
+    ``shares``: None, or a row of the shares of the light from everywhere that reach it.
     """
     first, last, _ = span
     rows, columns = ground.light.shape
@@ -89,6 +93,9 @@ def shade_floor(span, number, to_map, ground, row, pixels):
     back, bright, dark = single(ground.colours[0]), single(ground.colours[1]), single(ground.colours[2])
     start, line = np.float32(first + 0.5), np.float32(number + 0.5)
     share, lit, out = row.share[first:last], row.lit[first:last], pixels[first:last]
+    if shares is not None:
+        for k in range(len(out)):
+            sky[k] *= ONE - _AMBIENT * (ONE - shares[first + k])
     for k in range(len(out)):
         noise = _noise(start + np.float32(k), line) * share[k] * _STEP
         out[k] = packed(

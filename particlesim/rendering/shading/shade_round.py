@@ -16,12 +16,13 @@ _GRAZING = np.float32(0.3)
 
 
 @kernel
-def shade_round(span, form, paint, lighting, background, row, pixels):
+def shade_round(span, form, paint, lighting, background, row, pixels, sky):
     """Shade some pixels of a row, ``pixels`` (width,) int32.
 
     ``span``: the first, past the last, and y of their rays; ``form``: a point, an axis, 1 / radius, and a vector that
     is the normal where the radius is infinite, else 0: a sphere has no axis (0), a cylinder a unit vector along it.
-    ``paint``: linear colour, share of the ambient light, and of the background in it.
+    ``paint``: linear colour, share of the ambient light, and of the background in it; ``sky``: None, or a row of such
+    shares, times that.
     """
     first, last, y = span
     centre, axis, flat = single(form[0]), single(form[1]), single(form[3])
@@ -52,9 +53,12 @@ def shade_round(span, form, paint, lighting, background, row, pixels):
         step = min(max(towards / _GRAZING, NONE), ONE)
         key = lit[k] * max(towards, NONE) * step * step * (np.float32(3.0) - TWO * step)
         shine = lit[k] * _GLOSS * gloss
+        reaching = share
+        if sky is not None:
+            reaching = share * sky[first + k]
         upward = nx * zenith[0] + ny * zenith[1] + nz * zenith[2]
         out[k] = packed(
-            encode(red * (share * ambient(0, upward, facing) + KEY[0] * key) + shine, back[0], haze),
-            encode(green * (share * ambient(1, upward, facing) + KEY[1] * key) + shine, back[1], haze),
-            encode(blue * (share * ambient(2, upward, facing) + KEY[2] * key) + shine, back[2], haze),
+            encode(red * (reaching * ambient(0, upward, facing) + KEY[0] * key) + shine, back[0], haze),
+            encode(green * (reaching * ambient(1, upward, facing) + KEY[1] * key) + shine, back[1], haze),
+            encode(blue * (reaching * ambient(2, upward, facing) + KEY[2] * key) + shine, back[2], haze),
         )

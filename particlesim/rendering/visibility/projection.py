@@ -23,7 +23,9 @@ class Projection(NamedTuple):
     scale : float
         Pixels per metre, at distance 1 m if the projection is not parallel.
     size : (int, int)
-        Pixels across and down; ``eye`` projects to their middle.
+        Pixels across and down.
+    shift : (float, float)
+        From their middle to where ``eye`` projects to, across and up [pixels].
     """
 
     axes: np.ndarray
@@ -31,12 +33,14 @@ class Projection(NamedTuple):
     parallel: bool
     scale: float
     size: tuple[int, int]
+    shift: tuple[float, float] = (0.0, 0.0)
 
     def strip(self, first: int, last: int) -> Strip:
         """Columns ``first`` to ``last`` of the picture, for the kernels."""
         width, height = self.size
         axes, eye = np.ascontiguousarray(self.axes), np.ascontiguousarray(self.eye)
-        return Strip(axes, eye, self.parallel, self.scale, 0.5 * width, 0.5 * height, height, first, last)
+        middle = 0.5 * width + self.shift[0], 0.5 * height + self.shift[1]
+        return Strip(axes, eye, self.parallel, self.scale, *middle, height, first, last)
 
 
 class Strip(NamedTuple):
