@@ -41,6 +41,9 @@ LARGEST_MESH = 100_000_000
 # Endings of movies, .png of one as numbered pictures; the first is what is written if none is named.
 MOVIE_ENDINGS = (".mp4", ".webm", ".gif", ".png")
 
+# Those of them whose pictures may have no background.
+TRANSPARENT_ENDINGS = (".webm", ".png")
+
 # Endings of what runs are exported to; the first is what is written if none is named.
 EXPORT_ENDINGS = (".pvd", ".glb", ".usda", ".xyz")
 

@@ -35,7 +35,7 @@ from particlesim.rendering.video.segments import Segments
 from particlesim.scene import Scene
 from particlesim.scene.camera import Movie
 from particlesim.scene.file import load_scene
-from particlesim.simulation.needs import check_movie, check_simulation
+from particlesim.simulation.needs import check_movie, check_simulation, check_transparency
 from particlesim.simulation.simulation import Simulation
 from particlesim.simulation.soundness import SimulationError
 from particlesim.trajectory.gsd_file import Trajectory, TrajectoryWriter
@@ -182,6 +182,7 @@ def render(
         platform.choose()
         platform.describe_ffmpeg()  # which fails now, if it does, and not when all is simulated
         _compile(movable, look, progress)
+        check_transparency(path, (look or _scene_of(movable)).movie)
         if is_shared and isinstance(movable, Trajectory):
             by = workers, scheduler, threads
             return render_shared(movable, path, look or movable.scene, frames, run, by, progress)
@@ -211,7 +212,7 @@ def _film(folder: Path, path: Path, movie: Movie, source: FrameSource, sent: int
     """What takes the pictures of a movie that is to be at ``path``, of which so many were sent before it was left."""
     if is_sequence(path):
         return PictureFiles(folder, texts_of_pictures(source.header, source.wanted), sent)
-    return Segments(folder, movie.fps, movie.size, movie.crf, sent, source.begin, path.suffix.lower())
+    return Segments(folder, movie.fps, movie.size, movie.crf, sent, source.begin, path.suffix.lower(), movie.channels)
 
 
 @checked_arguments

@@ -17,6 +17,7 @@ from particlesim.rendering.hud.title import Title
 from particlesim.rendering.look import look_of
 from particlesim.rendering.shading.environment import Environment
 from particlesim.rendering.shading.fields import is_settled_by_frames
+from particlesim.rendering.transparency import straight
 from particlesim.rendering.video.fade import faded, strength, title_strength
 from particlesim.scene import Scene
 from particlesim.setup.build import contact_laws_of
@@ -47,7 +48,7 @@ class Pictures:
     ) -> None:
         self._source, self._movie, self._progress, self._run = source, scene.movie, progress, run
         around = Environment(scene)
-        self._background = around.background
+        self._background = np.zeros(4) if scene.movie.transparent else around.background
         self._title = Title(source.scene.title if scene.show.title else "", scene.movie.size, around.dark)
         self.summary = summary_of(scene, source.header)
         self._history = History.of_movie(source.wanted, source.first.ledger, scene.show.plot is not None)
@@ -83,6 +84,8 @@ class Pictures:
     def images(self, flush: Callable[[], None] = lambda: None) -> Iterator[np.ndarray]:
         """The pictures of the movie, (h, w, 3) uint8, with its fades and its title; all frames are taken into account.
 
+        Without a background they have a fourth channel, 0 where nothing is.
+
         Of a part of a movie only its pictures are given, though all frames of the movie are taken into account.
 
         ``flush`` is called when all that came before is to be kept.
@@ -97,7 +100,7 @@ class Pictures:
                 summary.drawn += 1
                 summary.seconds["drawing"] = self._drawers.seconds
                 self._tell()
-                yield self._title.over(faded(image, seen, self._background), titled)
+                yield straight(self._title.over(faded(image, seen, self._background), titled))
             if self._run is not None and (self._run.due() or (self._ended and self._wrong)):
                 flush()
                 self._keep(self._run)
@@ -150,9 +153,9 @@ class Pictures:
             self.poster = np.load(run.folder / POSTER)
 
     def _keep_poster(self, image: np.ndarray) -> None:
-        self.poster = image
+        self.poster = straight(image)
         if self._run is not None:
-            np.save(self._run.folder / POSTER, image)
+            np.save(self._run.folder / POSTER, self.poster)
 
     def _tell(self) -> None:
         """Say how many frames are done: those that have passed, but for the pictures that are yet to come."""

@@ -46,7 +46,7 @@ def draw_segment(task: SegmentTask) -> DrawnSegment:
         tempfile.TemporaryDirectory() as folder,
         _source(task) as source,
         Pictures(source, task.look, None, passed=History.of_table(task.passed)) as pictures,
-        Segments(Path(folder), movie.fps, movie.size, movie.crf, first, first, task.ending) as film,
+        Segments(Path(folder), movie.fps, movie.size, movie.crf, first, first, task.ending, movie.channels) as film,
     ):
         for image in pictures.images():
             film.send(image)

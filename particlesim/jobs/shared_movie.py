@@ -63,7 +63,7 @@ def render_shared(
     shared = SharedMovie(source, look, run, ending)
     shared.draw(by, progress)
     summary, origin = shared.summary, provenance(source.header, shared.summary, wanted)
-    with Segments(run.folder, movie.fps, movie.size, movie.crf, len(wanted), ending=ending) as film:
+    with Segments(run.folder, movie.fps, movie.size, movie.crf, len(wanted), 0, ending, movie.channels) as film:
         film.join(as_tags(origin))
     summary.seconds["encoding"] = film.seconds
     write_image(path.with_suffix(".png"), np.load(run.folder / POSTER), as_text(origin))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from particlesim.scene.camera import Movie
+
 
 class Quality(NamedTuple):
     """What a preset asks for."""
@@ -23,3 +25,10 @@ PRESETS = {
     "high": Quality(samples=2, fxaa=False, shadow=2.0, ambient_occlusion=True, lamps=6, sky=16),
     "best": Quality(samples=2, fxaa=False, shadow=2.0, ambient_occlusion=True, lamps=2, sky=12, passes=12),
 }
+
+
+def quality_of(movie: Movie) -> Quality:
+    """What the preset of a movie asks for."""
+    asked = PRESETS[movie.quality]
+    # Jagged edges are found by colours, of which a picture without a background has none beside its bodies.
+    return asked._replace(samples=2, fxaa=False) if asked.fxaa and movie.transparent else asked

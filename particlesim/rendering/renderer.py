@@ -13,7 +13,7 @@ from particlesim.rendering.hud.overlay import Overlay
 from particlesim.rendering.look import Look
 from particlesim.rendering.octree_cells import cell_lines, octree_cells
 from particlesim.rendering.passes import Pass, mean_of, passes_of
-from particlesim.rendering.quality import PRESETS
+from particlesim.rendering.quality import quality_of
 from particlesim.rendering.regions import region_lines
 from particlesim.rendering.scenery import Scenery
 from particlesim.rendering.shading.ambient_occlusion import AmbientOcclusion
@@ -24,6 +24,7 @@ from particlesim.rendering.shading.lighting import Light, Lighting, key_light, l
 from particlesim.rendering.shading.pixel_light import LightMaps, all_around, disc_of_lamps, light_maps
 from particlesim.rendering.shading.shade import Paint, Seen, seen_instances, shade
 from particlesim.rendering.shading.shadow import shadow_map
+from particlesim.rendering.transparency import cut_out
 from particlesim.rendering.visibility.instances import Instances, instances_of
 from particlesim.rendering.visibility.occlusion_clusters import OcclusionClusters, occlusion_clusters
 from particlesim.rendering.visibility.projection import Projection
@@ -57,7 +58,7 @@ class Renderer:
         found = platform.choose()
         self._bridge = bridge = platform.open_bridge(found)
         self._look, scene = look, look.scene
-        self._quality = quality = PRESETS[scene.movie.quality]
+        self._quality = quality = quality_of(scene.movie)
         self._size = scene.movie.size
         self._drawn_size = (quality.samples * self._size[0], quality.samples * self._size[1])
         self._environment = environment = Environment(scene)
@@ -100,7 +101,7 @@ class Renderer:
 
         Returns
         -------
-        (height, width, 3) uint8, sRGB.
+        (height, width, 3) uint8, sRGB; (height, width, 4) without a background, as transparency.py has it.
         """
         view = self._camera.view(frame.time)
         particles = instances_of(self._look.scene, self._look.header, frame, self._scenery.tables)
@@ -117,6 +118,8 @@ class Renderer:
             lighting = self._light.in_view(projection, shadow)
             maps = self._light_maps(projection, instances, clusters, one) if self._quality.sky else None
             colours = shade(projection, buffer, instances, paint, lighting, ground, maps)
+            if self._look.scene.movie.transparent:
+                colours = cut_out(colours, buffer.id)
             if len(self._scenery.clear):
                 colours = self._behind_panes(colours, buffer, view, frame.time, lighting, projection)
             # The floor, which is seen from above only, hides no line: those on it would be dashes.
@@ -127,7 +130,8 @@ class Renderer:
 
         # OpenGL's first row is the lowest, and it has a fourth channel.
         picture = mean_of(map(drawn, passes_of(self._quality.passes)))
-        image = fxaa(picture) if self._quality.fxaa else np.ascontiguousarray(picture[::-1, :, :3])
+        channels = self._look.scene.movie.channels
+        image = fxaa(picture) if self._quality.fxaa else np.ascontiguousarray(picture[::-1, :, :channels])
         self._overlay.draw(image, frame, history or History())
         return image
 

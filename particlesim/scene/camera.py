@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, WrapValidator, model_validator
 
 from particlesim.scene.base import (
-    Colour,
     Finite,
     Flag,
     Model,
@@ -17,7 +16,9 @@ from particlesim.scene.base import (
     PlainFloat,
     Positive,
     PositiveNumber,
+    Text,
     Vector,
+    colour_or,
     in_time,
     shorthand,
     whole,
@@ -175,13 +176,30 @@ class Movie(Model):
     resolution: Resolution | None = Field(
         default=None, description="[width, height], even; by the quality if not given [pixels]"
     )
-    background: Colour = Field(default="#f4f2ee", description="a colour name or '#rrggbb', behind all")
+    background: Annotated[Text, colour_or("transparent")] = Field(
+        default="#f4f2ee", description="behind all: a colour name, '#rrggbb', or 'transparent' in .webm and .png"
+    )
     crf: Annotated[int, Field(ge=0, le=51), whole, must_be("a whole number from 0 (lossless) to 51 (smallest)")] = (
         Field(default=18, description="constant rate factor of x264, from lossless to smallest: 6 more halve the file")
     )
     fade: Annotated[NotNegative, must_be("a number of seconds of 0 or more")] = Field(
         default=0.0, description="from the background at the start and to it at the end [s]"
     )
+
+    @property
+    def transparent(self) -> bool:
+        """Whether its pictures have no background."""
+        return self.background == "transparent"
+
+    @property
+    def channels(self) -> int:
+        """Of its pictures: red, green and blue, and how much covers what is behind where they have no background."""
+        return 4 if self.transparent else 3
+
+    @property
+    def behind(self) -> str:
+        """The colour that its pictures are drawn for: of white, where they have no background."""
+        return "white" if self.transparent else self.background
 
     @property
     def size(self) -> tuple[int, int]:

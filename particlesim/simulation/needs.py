@@ -6,7 +6,7 @@ import math
 import shutil
 from pathlib import Path
 
-from particlesim.core.constants import SEGMENT
+from particlesim.core.constants import SEGMENT, TRANSPARENT_ENDINGS
 from particlesim.core.output_path import OutputError, partial_folder
 from particlesim.scene import Scene
 from particlesim.scene.camera import Movie
@@ -62,6 +62,13 @@ def check_movie(scene: Scene, path: Path, pictures: int, simulated: bool) -> Non
     segment = 3 * math.prod(movie.size) * min(pictures, SEGMENT)
     # Segments are there until they are joined.
     _check_disk(path, 2.0 * movie_bytes(movie, pictures, _LEAST) + segment + state)
+
+
+def check_transparency(path: Path, movie: Movie) -> None:
+    """OutputError for a movie without a background in a format that has none such."""
+    ending = path.suffix.lower()
+    if movie.transparent and ending not in TRANSPARENT_ENDINGS:
+        raise OutputError(f"{path}: {ending} has no transparent background; .webm and .png have")
 
 
 def _check_disk(path: Path, needed: float) -> None:

@@ -152,7 +152,8 @@ class _Renderer(pyrender.Renderer):
         gl.glEnable(gl.GL_DEPTH_TEST)
         gl.glDepthMask(gl.GL_FALSE)
         gl.glEnable(gl.GL_BLEND)
-        gl.glBlendFunc(gl.GL_SRC_ALPHA, gl.GL_ONE_MINUS_SRC_ALPHA)
+        # The fourth channel of what is there says how much it hides, and the others are times that.
+        gl.glBlendFuncSeparate(gl.GL_SRC_ALPHA, gl.GL_ONE_MINUS_SRC_ALPHA, gl.GL_ONE, gl.GL_ONE_MINUS_SRC_ALPHA)
         self._program._bind()
         for mesh in scene.meshes:
             for lines in mesh.primitives:

@@ -133,8 +133,11 @@ class Panel:
         self._opacity[top : top + height, left : left + width] = 1.0
 
     def lay(self, image: np.ndarray, left: int, top: int, seen: float = 1.0) -> None:
-        """Lay it over a picture (h, w, 3) uint8, as far as that goes; so much of it is ``seen``, 0 .. 1."""
+        """Lay it over a picture (h, w, 3 or 4) uint8, as far as that goes; so much of it is ``seen``, 0 .. 1."""
         below = image[top : top + self._colour.shape[0], left : left + self._colour.shape[1]]
         height, width = below.shape[:2]
         opacity = seen * self._opacity[:height, :width]
-        below[:] = (below + opacity * (self._colour[:height, :width] - below) + 0.5).astype(np.uint8)
+        colour = self._colour[:height, :width]
+        if image.shape[2] == 4:
+            colour = np.dstack([colour, np.full((height, width), 255.0, dtype=np.float32)])
+        below[:] = (below + opacity * (colour - below) + 0.5).astype(np.uint8)

@@ -42,7 +42,7 @@ class ParticleColours:
 
     def __init__(self, scene: Scene, header: Header, frames: Sequence[Frame]) -> None:
         self._header = header
-        self.background = encoded(scene.movie.background)
+        self.background = encoded(scene.movie.behind)
         self._fixed = fixed_colours(scene, header)
         shown = {colour.field: colour for colour in reversed(field_colours(scene)) if colour is not None}
         kinds = [kind for kind in FIELDS if kind in shown]

@@ -9,6 +9,7 @@ from particlesim.rendering.gl import geometry
 from particlesim.rendering.shading.colour_maps import encoded
 from particlesim.rendering.shading.lighting import towards_light
 from particlesim.rendering.shading.shade_floor import Ground
+from particlesim.rendering.transparency import CLEAR_FLOOR
 from particlesim.scene import Scene
 
 # The floor fades out over this fraction of the world's longer horizontal side, beyond all shadows that it may bear.
@@ -28,7 +29,7 @@ class Environment:
         self._scene = scene
         self._size = np.asarray(scene.world.size, dtype=np.float64)
         self._rim = _FLOOR_RIM * float(max(self._size[:2]))
-        self.background = encoded(scene.movie.background)
+        self.background = encoded(scene.movie.behind)
         self.dark = bool(self.background.mean() < 0.5)
         lower, towards = -0.5 * self._size, towards_light(scene)
         # How far from below it the shadow of what is at the top of the world falls.
@@ -36,6 +37,8 @@ class Environment:
         self._floor = lower[:2] + np.minimum(cast, 0.0), -lower[:2] + np.maximum(cast, 0.0), float(lower[2])
         # A shade off the background, so that the floor is seen, and a shadow on it even when that is black.
         self._bright = self.background * 0.97 + (0.06 if self.dark else 0.0)
+        if scene.movie.transparent:
+            self._bright = np.full(3, CLEAR_FLOOR / 255.0)
         self.has_floor = scene.world.boundary[2] == "wall"
 
     @property
@@ -53,7 +56,8 @@ class Environment:
         """Where far things become pale, as ``Paint`` has it: from the nearest corner of the world to the farthest."""
         back, eye = view.pose[:3, 2], view.pose[:3, 3]
         depth = float(np.abs(back) @ self._size)
-        return np.array([float(back @ eye) - 0.5 * depth, 1.0 / depth, _HAZE])
+        haze = 0.0 if self._scene.movie.transparent else _HAZE
+        return np.array([float(back @ eye) - 0.5 * depth, 1.0 / depth, haze])
 
     def box_lines(self, view: View, width: float) -> np.ndarray:
         """Lines (see gl.geometry) for the edges of the world, ``width`` [pixels] wide; none if a scene hides it."""

@@ -39,7 +39,7 @@ _WITHOUT_SETTINGS = ["-bsf:v", "filter_units=remove_types=6"]
 
 
 def write_image(path: str | Path, image: np.ndarray, text: Mapping[str, str] | None = None) -> None:
-    """Write an image (height, width, 3) uint8 sRGB in the format of the path's ending, such as .png, and texts with it.
+    """Write an image (height, width, 3 or 4) uint8 sRGB in the format of the path's ending, such as .png, with texts.
 
     RenderError for an ending that stands for no format; OSError for a path that cannot be written.
     """
@@ -57,13 +57,17 @@ class Encoder:
     """ffmpeg in a process of its own, fed by a thread, so that the next image is drawn while one is encoded.
 
     It encodes images (height, width, 3) uint8 sRGB of ``size`` (width, height, both even) to ``path``, an MP4 file: as
-    movies with this ``ending`` have them, or for a .gif so that nothing is lost. The same images give the same bytes.
+    movies with this ``ending`` have them, or for a .gif so that nothing is lost. The same images give the same bytes. A
+    .webm may have four ``channels``, and is then encoded to a file of its own kind.
     ``close`` ends it, whatever it is at; ``seconds`` were spent encoding.
     """
 
-    def __init__(self, path: Path, fps: float, size: tuple[int, int], crf: int, ending: str = ".mp4") -> None:
-        self._size = size
-        command = _command(path, fps, size, _CODECS[ending](crf))
+    def __init__(
+        self, path: Path, fps: float, size: tuple[int, int], crf: int, ending: str = ".mp4", channels: int = 3
+    ) -> None:
+        self._shape = size[1], size[0], channels
+        codec, kind = (_CODECS[ending](crf), "mp4") if channels == 3 else (_vp9_with_alpha(crf), "webm")
+        command = _command(path, fps, self._shape, codec, kind)
         self._log = tempfile.TemporaryFile()  # noqa: SIM115  (closed in close)
         # A session of its own: Ctrl-C is for us to handle, and ends ffmpeg from here.
         self._process = subprocess.Popen(
@@ -86,9 +90,8 @@ class Encoder:
 
     def send(self, image: np.ndarray) -> None:
         """Hand over an image, waiting while ffmpeg is behind. ValueError for another size, RenderError if it fails."""
-        width, height = self._size
-        if image.shape != (height, width, 3) or image.dtype != np.uint8:
-            raise ValueError(f"an image of shape {image.shape} {image.dtype}, not {(height, width, 3)} uint8")
+        if image.shape != self._shape or image.dtype != np.uint8:
+            raise ValueError(f"an image of shape {image.shape} {image.dtype}, not {self._shape} uint8")
         if self._broken.is_set():
             self._fail()
         self._images.put(np.ascontiguousarray(image))
@@ -131,13 +134,15 @@ def failure(status: int, log: bytes) -> RenderError:
     return RenderError(f"ffmpeg {how}: {last}")
 
 
-def _command(path: Path, fps: float, size: tuple[int, int], codec: list[str]) -> list[str]:
+def _command(path: Path, fps: float, shape: tuple[int, int, int], codec: list[str], kind: str) -> list[str]:
     rate = str(Fraction(fps).limit_denominator(1001))
-    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", rate, "-i", "-"]
+    height, width, channels = shape
+    pixels = ["-pix_fmt", "rgb24" if channels == 3 else "rgba", "-s", f"{width}x{height}"]
+    source = ["-f", "rawvideo", *pixels, "-r", rate, "-i", "-"]
     # No versions or dates in the file: the same images, the same bytes.
     bare = ["-threads", str(_THREADS), "-fflags", "+bitexact", "-flags:v", "+bitexact"]
     # A path as it is: "12:30.mp4" would be a protocol.
-    target = ["-f", "mp4", f"file:{path}"]
+    target = ["-f", kind, f"file:{path}"]
     return [ffmpeg(), "-y", "-v", "error", *source, "-an", *codec, *bare, *target]
 
 
@@ -150,6 +155,12 @@ def _vp9(crf: int) -> list[str]:
     # such that two cores encode about as fast as they draw.
     constant = ["-crf", str(round(crf * 63 / 51)), "-b:v", "0"]
     return [*_YUV, *_TAGS, "-c:v", "libvpx-vp9", *constant, "-deadline", "good", "-cpu-used", "5", "-row-mt", "1"]
+
+
+def _vp9_with_alpha(crf: int) -> list[str]:
+    # Alpha goes as a second stream of grey; frames that are not shown would have none.
+    pictures = [_YUV[0], _YUV[1].replace("yuv420p", "yuva420p")]
+    return [*pictures, *_vp9(crf)[len(_YUV) :], "-auto-alt-ref", "0"]
 
 
 def _lossless(crf: int) -> list[str]:

@@ -30,7 +30,10 @@ def _smooth(share: float) -> float:
 
 
 def faded(image: np.ndarray, seen: float, background: np.ndarray) -> np.ndarray:
-    """An image (h, w, 3) uint8 of which so much is seen, 0 .. 1, before ``background`` (3,) sRGB 0 .. 1."""
+    """An image (h, w, 3) uint8 of which so much is seen, 0 .. 1, before ``background`` (3,) sRGB 0 .. 1.
+
+    Of four channels (see transparency.py) each has its own background.
+    """
     if seen >= 1.0:
         return image
     blend = seen * image + (1.0 - seen) * 255.0 * background

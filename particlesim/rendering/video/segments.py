@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Mapping
@@ -42,6 +43,8 @@ class Segments:
         The picture that a part of a movie begins with, which begins a segment.
     ending : str
         Of the whole movie: .mp4, .webm or .gif.
+    channels : int
+        Of the pictures: 4 if they have no background, of which .webm alone knows.
     """
 
     def __init__(
@@ -53,8 +56,10 @@ class Segments:
         sent: int = 0,
         first: int = 0,
         ending: str = ".mp4",
+        channels: int = 3,
     ) -> None:
         self._folder, self._fps, self._size, self._crf, self._ending = folder, fps, size, crf, ending
+        self._channels = channels
         self._encoder: Encoder | None = None
         self._pictures: BinaryIO | None = None  # of the segment that is open
         self.sent, self._first = sent, first
@@ -74,7 +79,7 @@ class Segments:
             self._pictures.close()
 
     def send(self, image: np.ndarray) -> None:
-        """Add a picture (height, width, 3) uint8 sRGB. ValueError for another size, RenderError if ffmpeg fails."""
+        """Add a picture (h, w, channels) uint8 sRGB. ValueError for another size, RenderError if ffmpeg fails."""
         number, place = divmod(self.sent, SEGMENT)
         self.sent += 1
         if self._segment(number).exists():  # closed after what was kept last, with this very picture
@@ -128,11 +133,13 @@ class Segments:
 
     def _open(self, number: int, kept: int = 0) -> None:
         """Begin a segment, or begin it again with the pictures of it that were kept."""
-        self._encoder = Encoder(self._part(number), self._fps, self._size, self._crf, self._ending)
+        codec = self._crf, self._ending, self._channels
+        self._encoder = Encoder(self._part(number), self._fps, self._size, *codec)
         self._pictures = pictures = self._raw(number).open("r+b" if kept else "wb")
         width, height = self._size
+        shape = height, width, self._channels
         for _ in range(kept):
-            self._encoder.send(np.frombuffer(pictures.read(3 * width * height), np.uint8).reshape(height, width, 3))
+            self._encoder.send(np.frombuffer(pictures.read(math.prod(shape)), np.uint8).reshape(shape))
         pictures.truncate()  # of what came after
 
     def _close(self, number: int) -> None:
