@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from particlesim.scene.camera import Movie
+from particlesim.scene import Scene
 
 
 class Quality(NamedTuple):
@@ -27,8 +27,10 @@ PRESETS = {
 }
 
 
-def quality_of(movie: Movie) -> Quality:
-    """What the preset of a movie asks for."""
-    asked = PRESETS[movie.quality]
-    # Jagged edges are found by colours, of which a picture without a background has none beside its bodies.
-    return asked._replace(samples=2, fxaa=False) if asked.fxaa and movie.transparent else asked
+def quality_of(scene: Scene) -> Quality:
+    """What the preset of a scene's movie asks for."""
+    asked = PRESETS[scene.movie.quality]
+    # Jagged edges are found by colours, of which a picture without a background has none beside its bodies; fine lines
+    # would be taken for them.
+    several = scene.movie.transparent or scene.show.outlines
+    return asked._replace(samples=2, fxaa=False) if asked.fxaa and several else asked

@@ -21,6 +21,7 @@ from particlesim.rendering.shading.environment import Environment
 from particlesim.rendering.shading.floor import FloorOcclusion
 from particlesim.rendering.shading.fxaa import fxaa
 from particlesim.rendering.shading.lighting import Light, Lighting, key_light, lights_from
+from particlesim.rendering.shading.outlines import draw_outlines
 from particlesim.rendering.shading.pixel_light import LightMaps, all_around, disc_of_lamps, light_maps
 from particlesim.rendering.shading.shade import Paint, Seen, seen_instances, shade
 from particlesim.rendering.shading.shadow import shadow_map
@@ -31,9 +32,11 @@ from particlesim.rendering.visibility.projection import Projection
 from particlesim.rendering.visibility.rasterise import VisibilityBuffer, rasterise
 from particlesim.trajectory.frames import Frame
 
-# Widths of lines [pixels] in a picture 720 pixels high: the edges of the world, and those of the octree's cells.
+# Widths of lines [pixels] in a picture 720 pixels high: the edges of the world, those of the octree's cells, and of
+# bodies.
 _BOX_LINE = 1.3
 _CELL_LINE = 0.8
+_OUTLINE = 1.5
 
 # Triangles cast shadows from so many texels of the shadow map behind them: what is lit at a slant is looked for in
 # some texels about it, and must not be in the shadow of itself.
@@ -58,7 +61,7 @@ class Renderer:
         found = platform.choose()
         self._bridge = bridge = platform.open_bridge(found)
         self._look, scene = look, look.scene
-        self._quality = quality = quality_of(scene.movie)
+        self._quality = quality = quality_of(scene)
         self._size = scene.movie.size
         self._drawn_size = (quality.samples * self._size[0], quality.samples * self._size[1])
         self._environment = environment = Environment(scene)
@@ -120,6 +123,9 @@ class Renderer:
             colours = shade(projection, buffer, instances, paint, lighting, ground, maps)
             if self._look.scene.movie.transparent:
                 colours = cut_out(colours, buffer.id)
+            if self._look.scene.show.outlines:
+                body, radius = self._scenery.bodies_in(instances), projection.scale * instances.tables.radius
+                draw_outlines(colours, buffer, body, radius, _OUTLINE * self._line_scale)
             if len(self._scenery.clear):
                 colours = self._behind_panes(colours, buffer, view, frame.time, lighting, projection)
             # The floor, which is seen from above only, hides no line: those on it would be dashes.
@@ -203,10 +209,15 @@ class Renderer:
             return self._floor.light(instances.position, instances.source)
         return np.ones((2, 2) if self._environment.has_floor else (0, 0), dtype=np.float32)
 
+    @property
+    def _line_scale(self) -> float:
+        """Drawn pixels for each of a picture 720 pixels high."""
+        return self._quality.samples * max(1.0, self._size[1] / 720.0)
+
     def _put_lines(self, view: View, frame: Frame) -> None:
         """The edges of the world, of regions in drafts and, if they are shown, of the octree's cells."""
         scene = self._look.scene
-        width = self._quality.samples * max(1.0, self._size[1] / 720.0)
+        width = self._line_scale
         rows = [self._environment.box_lines(view, _BOX_LINE * width)]
         if scene.movie.quality == "draft" and scene.is_open:
             rows.append(region_lines(scene, width=_CELL_LINE * width))

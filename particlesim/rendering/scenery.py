@@ -45,6 +45,7 @@ class Scenery:
         self._obstacles = obstacles_of(scene, header.obstacles)
         self._size = np.array([o.size if o.shape.is_bounded else 1.0 for o in self._obstacles])
         self._parts = [self._parts_of(k, shape, len(header.shapes) + k) for k, shape in enumerate(header.obstacles)]
+        self._obstacle_shapes = np.unique(np.concatenate([[-1], *(part.body["shape"] for part in self._parts)]))
         self._colour = np.array([parse(said.colour) for said in scene.obstacles]).reshape(-1, 3)
         self._opacity = np.array([said.opacity for said in scene.obstacles])
         self.opaque = np.flatnonzero(self._opacity == 1.0)
@@ -87,6 +88,13 @@ class Scenery:
             joined(particles.tables, others.tables),
             np.concatenate([source, others.source]),
         )
+
+    def bodies_in(self, instances: Instances) -> np.ndarray:
+        """A number (m,) for each of instances that ``amid`` has made: the triangles of an obstacle have the same."""
+        number = np.arange(len(instances.position))
+        others = np.isin(instances.tables.body["shape"], self._obstacle_shapes)
+        number[others] = -1 - instances.bodies(number[others])
+        return number
 
     def casting(self, instances: Instances, behind: np.ndarray) -> Instances:
         """Instances as they cast shadows: triangles, which have no thickness, from ``behind`` (3,) themselves [m]."""

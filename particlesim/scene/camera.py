@@ -235,6 +235,7 @@ class Show(Model):
 
     box: Flag | None = Field(default=None, description="edges of the world; if not given, unless all axes are open")
     cells: Flag = Field(default=False, description="leaves of the octree")
+    outlines: Flag = Field(default=False, description="dark lines where bodies end")
     plot: Annotated[Literal["energy", "momentum", "impacts"], one_of("energy", "momentum", "impacts")] | None = Field(
         default=None, description="curves over the time, which grow with the movie"
     )
