@@ -2,7 +2,6 @@
 
 import errno
 import os
-import random
 import resource
 import shutil
 import signal
@@ -60,26 +59,6 @@ def stopped(frames, error=KeyboardInterrupt):
 
 def some(**settings):
     return gas(3, **{"title": "Left", "duration": 2.5, "movie": {"resolution": [64, 64], "fps": 30}, **settings})
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["run.gsd", "movie.mp4"])
-def test_killed_at_any_moment_it_ends_as_if_it_had_not_been(tmp_path, name):
-    scene, path = tmp_path / "scene.toml", tmp_path / name
-    scene.write_text(SCENE)
-    killed.run(scene, tmp_path / f"straight_{name}")
-    rng = random.Random(17)
-    kills = 0
-    while killed.run(scene, path, rng.uniform(0.4, 1.2)) and kills < 4:
-        kills += 1
-        assert not path.exists()
-    killed.run(scene, path)
-    assert killed.content(path) == killed.content(tmp_path / f"straight_{name}")
-    if name == "movie.mp4":
-        for suffix in (".mp4", ".png"):
-            straight = (tmp_path / "straight_movie").with_suffix(suffix)
-            assert path.with_suffix(suffix).read_bytes() == straight.read_bytes()
-    assert not list(tmp_path.glob(".*"))
 
 
 @pytest.mark.parametrize("name", ["run.gsd", "movie.mp4", "movie.webm", "movie.gif"])
@@ -146,6 +125,30 @@ def test_what_ended_before_anything_was_kept_leaves_nothing(tmp_path):
     (partial_folder(tmp_path / "run.gsd") / "trajectory.gsd").write_text("torn")
     ps.simulate(some(), tmp_path / "run.gsd")
     assert [file.name for file in tmp_path.iterdir()] == ["run.gsd"]
+
+
+@pytest.mark.parametrize("name", ["run.gsd", "movie.mp4"])
+def test_killed_while_its_folder_goes_it_leaves_nothing_that_counts(tmp_path, always, monkeypatch, name):
+    def killed_amid_this(folder):
+        next(folder.glob("*.ckpt")).unlink()
+        raise KeyboardInterrupt
+
+    make = ps.simulate if name == "run.gsd" else ps.render
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(partial_run.shutil, "rmtree", killed_amid_this)
+        make(some(), tmp_path / name)
+    whole = killed.content(tmp_path / name)
+    assert partial_folder(tmp_path / name).is_dir()
+    make(some(), tmp_path / name, resume=True)
+    assert killed.content(tmp_path / name) == whole and not list(tmp_path.glob(".*"))
+
+
+def test_killed_as_its_trajectory_has_just_appeared_it_begins_anew(tmp_path, always):
+    folder = left(tmp_path / "run.gsd", 76)
+    (folder / "trajectory.gsd").rename(tmp_path / "run.gsd")
+    whole = killed.content(tmp_path / "run.gsd")
+    ps.simulate(some(), tmp_path / "run.gsd", resume=True)
+    assert killed.content(tmp_path / "run.gsd") == whole and not folder.exists()
 
 
 def test_a_folder_that_is_gone_is_not_said_to_be_kept(tmp_path, always):

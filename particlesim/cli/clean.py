@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from typing import Annotated
 
@@ -23,7 +22,7 @@ def clean(
 ) -> None:
     """Show the partial runs that were left beside their outputs, and remove them if told to."""
     with one_line_errors(Path("clean")):
-        from particlesim.jobs.partial_run import partial_runs  # noqa: PLC0415
+        from particlesim.jobs.partial_run import partial_runs, remove_run  # noqa: PLC0415
 
         found = [run for place in places or [Path(), Path("renders")] for run in partial_runs(place)]
         if not found:
@@ -31,7 +30,7 @@ def clean(
             return
         for run in found:
             if remove and not run.at_work:
-                shutil.rmtree(run.folder)
+                remove_run(run.folder)
         state = {True: "at work", False: "removed" if remove else "left"}
         rows = [(str(run.folder), f"{run.frames}, {run.size / 1e6:,.1f} MB, {state[run.at_work]}") for run in found]
         print_table("partial runs", rows)

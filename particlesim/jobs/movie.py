@@ -87,13 +87,15 @@ def simulate(
     scene = scene if isinstance(scene, Scene) else load_scene(scene)
     check_simulation(scene, Path(path))
     with PartialRun(path, task_of(scene), resume) as run:
+        growing = run.folder / "trajectory.gsd"
+        if not growing.exists():  # it has become the output, if that run was killed right then
+            run.forget()
         compile_kernels(scene, None, progress)
         simulation = Simulation.load(run.state, threads=threads) if run.state else start(scene, threads, progress)
         summary = summary_of(scene, simulation.header)
         if run.kept and run.state:
             summary.go_on(run.kept["values"])
         frames = frames_of(simulation, summary.first or simulation.ledger, scene.frames, summary.frames)
-        growing = run.folder / "trajectory.gsd"
         kept = scene.trajectory.kept(summary.frames)
         with TrajectoryWriter(growing, simulation.header, kept) as writer:
             try:

@@ -9,6 +9,7 @@ import os
 import shutil
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -77,9 +78,12 @@ class PartialRun:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         gone = not self.folder.exists()
-        if error is None or self.kept is None:
-            shutil.rmtree(self.folder, ignore_errors=True)
-        os.close(self._lock)
+        try:
+            if error is None or self.kept is None:
+                with suppress(OSError):
+                    remove_run(self.folder)
+        finally:
+            os.close(self._lock)
         if gone and isinstance(error, Exception):
             raise FileNotFoundError(f"{self._path}: what was done of it is gone, with {self.folder}") from error
         if isinstance(error, OSError) and (error.filename is None or self._is_ours(error.filename)):
@@ -126,12 +130,18 @@ class PartialRun:
         now = time.monotonic()
         self._next = now + max(INTERVAL, _SPARE * (now - start))
 
+    def forget(self) -> None:
+        """Let nothing be kept."""
+        self.kept = None
+        (self.folder / _INDEX).unlink(missing_ok=True)
+        for file in self.folder.iterdir():
+            file.unlink()
+
     def _look(self) -> None:
         """See what is there. PartialRunError if it is not to be gone on with, or cannot be."""
         found = _index(self.folder)
-        if found is None:  # ended before anything was kept
-            for file in self.folder.iterdir():
-                file.unlink()
+        if found is None:  # ended before anything was kept, or while it was removed
+            self.forget()
             return
         self.kept = found
         where = f"{self._path}: there is a partial run of it, {_frames(found)}, in {partial_folder(self._path)}"
@@ -164,6 +174,13 @@ def partial_runs(place: Path) -> Iterator[Found]:
         found = _index(folder)
         frames = "nothing kept" if found is None else _frames(found)
         yield Found(folder, frames, sum(file.stat().st_size for file in folder.iterdir()), lock is None)
+
+
+def remove_run(folder: Path) -> None:
+    """Remove a partial run. OSError if that cannot be done."""
+    # First what says what counts: of half a run, if this is interrupted, nothing does.
+    (folder / _INDEX).unlink(missing_ok=True)
+    shutil.rmtree(folder)
 
 
 def _frames(kept: dict[str, Any]) -> str:
