@@ -45,9 +45,7 @@ def test_all_of_a_mesh_is_in_its_table():
     solid = trimesh.creation.icosphere(subdivisions=2)
     shape = triangle_mesh("ball", solid.vertices, solid.faces)
     table = stack_shapes([shape])
-    assert (
-        len(shape.triangles) == len(solid.faces) == table.shape["last_triangle"][0] - table.shape["first_triangle"][0]
-    )
+    assert len(shape.triangles) == len(solid.faces) == table.shape["last_part"][0] - table.shape["first_part"][0]
     rows = table.shape[1:]
     corners = np.stack([table.vertex[rows["first_vertex"] + k] for k in range(3)], axis=1)
     key = lambda triangles: sorted(map(tuple, np.sort(triangles.round(9), axis=1).reshape(-1, 9).tolist()))  # noqa: E731

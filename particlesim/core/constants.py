@@ -1,14 +1,16 @@
 """Tags shared by every floor, and sizes that arrays are laid out by."""
 
 # Kinds of shapes: the core of a sphere is a point, of a capsule a segment, of a polyhedron a convex hull; each may have
-# a rounding radius. A half-space is what lies behind a plane: a wall of the box. A mesh is triangles, each of which is
-# a shape by itself.
+# a rounding radius. A half-space is what lies behind a plane: a wall of the box. A mesh is triangles, and a compound is
+# convex shapes, each of which is a shape by itself; a ball is a sphere that need not be about the position of its body.
 SPHERE = 0
 CAPSULE = 1
 POLYHEDRON = 2
 HALF_SPACE = 3
 MESH = 4
 TRIANGLE = 5
+COMPOUND = 6
+BALL = 7
 
 # Metres in the units of length that a mesh file may be in.
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}

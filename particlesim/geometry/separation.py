@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from particlesim.core.arguments import checked_arguments, real_numbers, shown
-from particlesim.core.constants import HALF_SPACE, MAX_MANIFOLD
+from particlesim.core.constants import COMPOUND, HALF_SPACE, MAX_MANIFOLD
 from particlesim.core.math3d import quat_multiply, quat_normalize
 from particlesim.geometry.narrow_phase.pair import pair_contact
 from particlesim.geometry.shape_table import stack_shapes
@@ -61,7 +62,8 @@ def separation(shape_a: Shape | str, pose_a: Any, shape_b: Shape | str, pose_b: 
     Returns
     -------
     Separation
-        Distance, normal from a to b, and contact points; against a half-space the points are on the first shape.
+        Distance, normal from a to b, and contact points; against a half-space the points are on the first shape. Of
+        compounds, those of the two parts that are nearest, or deepest in each other.
 
     Raises
     ------
@@ -78,10 +80,17 @@ def separation(shape_a: Shape | str, pose_a: Any, shape_b: Shape | str, pose_b: 
     points = np.empty((MAX_MANIFOLD, 3))
     offset = tuple((position_b - position_a).tolist())
     table = stack_shapes(shapes)
-    distance, normal, count = pair_contact(
-        table, (0, size_a, orientations[0]), (1, size_b, orientations[1]), offset, points
-    )
-    return Separation(distance, np.array(normal), position_a + points[:count])
+    found = []
+    for row_a, row_b in product(*(_rows(table.shape[k], k) for k in range(2))):
+        part_a, part_b = (row_a, size_a, orientations[0]), (row_b, size_b, orientations[1])
+        distance, normal, count = pair_contact(table, part_a, part_b, offset, points)
+        found.append(Separation(distance, np.array(normal), position_a + points[:count]))
+    return min(found, key=lambda separation: separation.distance)
+
+
+def _rows(record: np.void, row: int) -> range:
+    """Rows of the shape table of what a shape in a ``row`` consists of: a compound of its parts."""
+    return range(record["first_part"], record["last_part"]) if record["kind"] == COMPOUND else range(row, row + 1)
 
 
 def _shape(name: str, shape: Shape | str) -> Shape:

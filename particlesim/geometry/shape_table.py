@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,12 +13,12 @@ from particlesim.core.constants import TRIANGLE
 from particlesim.core.records import record
 from particlesim.geometry.flat_prisms import CORNERS, EDGES, FACES, LINKS, flat_prisms
 from particlesim.geometry.shape_links import links_before_rings, links_of
-from particlesim.geometry.shapes import Shape
+from particlesim.geometry.shapes import Shape, sphere
 
 # A shape: a convex core and a rounding radius. Ranges are half open, into the other arrays of the table.
 SHAPE = record(
     [
-        ("kind", np.int64),  # SPHERE, CAPSULE, POLYHEDRON, HALF_SPACE, MESH or TRIANGLE
+        ("kind", np.int64),  # SPHERE, CAPSULE, POLYHEDRON, HALF_SPACE, MESH, TRIANGLE, COMPOUND or BALL
         ("radius", np.float64),  # of the bounding sphere at size 1, rounding included [m]
         ("inradius", np.float64),  # of the inscribed sphere at size 1, rounding included [m]
         ("rounding", np.float64),  # how far the surface is outside of the core at size 1 [m]
@@ -28,8 +29,8 @@ SHAPE = record(
         ("first_edge", np.int64),
         ("last_edge", np.int64),
         ("link", np.int64),  # where its part of the table's ``link`` begins; -1 of a shape without edges
-        ("first_triangle", np.int64),  # of a mesh: rows of shapes, in the order of its tree
-        ("last_triangle", np.int64),
+        ("first_part", np.int64),  # rows of shapes: the triangles of a mesh in the order of its tree, or of a compound
+        ("last_part", np.int64),
     ],
 )
 
@@ -45,7 +46,7 @@ FACE = record(
 
 
 class ShapeTable(NamedTuple):
-    """All shapes of a scene end to end, then the triangles of those that are meshes."""
+    """All shapes of a scene end to end, then the parts of compounds, then the triangles of meshes."""
 
     shape: np.ndarray  # (s,) SHAPE
     vertex: np.ndarray  # (v, 3) float64, of the cores at size 1, body axes [m]
@@ -58,19 +59,43 @@ class ShapeTable(NamedTuple):
 def stack_shapes(shapes: Sequence[Shape], drawn: bool = False) -> ShapeTable:
     """The shapes as one table for the kernels, which is not to be written to: the same shapes have the same one.
 
-    Triangles are about the position of their mesh, that they turn about; to be ``drawn``, about their own middles.
+    Triangles and parts are about the position of their body, that they turn about; to be ``drawn``, about the middles
+    of the boxes about them.
     """
     return _stacked(tuple(shapes), drawn)
 
 
+def with_parts(shapes: Sequence[Shape]) -> tuple[Shape, ...]:
+    """The shapes, then the parts of those that are compounds, and the point that parts are asked for their distance."""
+    parts = [part for shape in shapes for part in shape.parts]
+    return (*shapes, *parts, sphere()) if parts else tuple(shapes)
+
+
 @functools.lru_cache(maxsize=8)
 def _stacked(shapes: tuple[Shape, ...], drawn: bool) -> ShapeTable:
-    table = _stacked_as_they_are(shapes)
+    every = with_parts(shapes)
+    if drawn:
+        every = (*shapes, *(_about_middle(shape) for shape in every[len(shapes) :]))
+    table = _stacked_as_they_are(every)
+    begin = len(shapes)
+    for row, shape in enumerate(shapes):
+        table.shape["first_part"][row], table.shape["last_part"][row] = begin, begin + len(shape.parts)
+        begin += len(shape.parts)
     for row, shape in enumerate(shapes):
         if len(shape.triangles):
             corners = shape.vertices[shape.triangles]
             table = _with_triangles(table, row, corners - corners.mean(axis=1, keepdims=True) if drawn else corners)
     return table
+
+
+def middle_of(part: Shape) -> np.ndarray:
+    """The middle of the box about a part of a compound, at size 1 (3,) [m]."""
+    return 0.5 * (part.vertices.min(axis=0) + part.vertices.max(axis=0))
+
+
+def _about_middle(part: Shape) -> Shape:
+    vertices = part.vertices - middle_of(part)
+    return replace(part, vertices=vertices, radius=float(np.linalg.norm(vertices, axis=1).max()) + part.rounding)
 
 
 def _stacked_as_they_are(shapes: tuple[Shape, ...]) -> ShapeTable:
@@ -142,7 +167,7 @@ def _with_triangles(table: ShapeTable, mesh: int, corners: np.ndarray) -> ShapeT
     # Cells of directions, which come before, are looked at where a core has many vertices.
     rows["link"] = len(table.link) + LINKS * each - links_before_rings()
     shape = np.concatenate([table.shape, rows])
-    shape["first_triangle"][mesh], shape["last_triangle"][mesh] = len(table.shape), len(shape)
+    shape["first_part"][mesh], shape["last_part"][mesh] = len(table.shape), len(shape)
     vertex = rows["first_vertex"][:, None]
     face = np.zeros(FACES * count, dtype=FACE)
     face["normal"], face["offset"] = prisms.normals.reshape(-1, 3), prisms.offsets.ravel()

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from particlesim.core.arguments import FARTHEST, checked_arguments, real_numbers, shown
-from particlesim.core.constants import CAPSULE, HALF_SPACE, MESH, POLYHEDRON, SPHERE
+from particlesim.core.constants import CAPSULE, COMPOUND, HALF_SPACE, MESH, POLYHEDRON, SPHERE
 from particlesim.core.polyhedra import POLYHEDRA
 from particlesim.geometry.convex_hull import (
     NO_VOLUME,
@@ -51,7 +51,8 @@ class Shape:
     ----------
     name : str
     kind : int
-        SPHERE, CAPSULE, POLYHEDRON, HALF_SPACE (see ``half_space``) or MESH (see ``triangle_mesh``).
+        SPHERE, CAPSULE, POLYHEDRON, HALF_SPACE (see ``half_space``), MESH (see ``triangle_mesh``) or COMPOUND (see
+        compounds.py), whose core is the box about it; of the parts of a compound BALL, CAPSULE or POLYHEDRON.
     vertices : (v, 3) float64 [m]
         Of the core.
     faces : tuple of tuples of int
@@ -62,7 +63,8 @@ class Shape:
     moments : (3,) float64 [kg m^2]
         Principal moments at density 1 kg/m^3.
     radius, inradius : float [m]
-        Of the bounding and of the inscribed sphere about the centroid.
+        Of the bounding and of the inscribed sphere about the centroid; of a compound the smallest inscribed sphere of
+        its parts.
     orientation : (4,) float64
         Quaternion (w, x, y, z) that turns the principal axes into the axes that the shape was described in; the
         identity where those are principal, as they are for all but meshes and hulls.
@@ -73,6 +75,8 @@ class Shape:
         Of a mesh: its triangles, by their vertices, in the order of the tree over them; (0, 3) of any other shape.
     remarks : tuple of str
         Of a mesh: what is odd about it, a line each.
+    parts : tuple of Shape
+        Of a compound: where they are in it, about its centroid and in its axes; () of any other shape.
     """
 
     name: str
@@ -88,6 +92,7 @@ class Shape:
     described_corners: int = 0
     triangles: np.ndarray = field(default_factory=lambda: _NO_TRIANGLES)
     remarks: tuple[str, ...] = ()
+    parts: tuple[Shape, ...] = ()
 
     @property
     def is_sphere(self) -> bool:
@@ -101,8 +106,8 @@ class Shape:
 
     @property
     def is_convex(self) -> bool:
-        """Whether it is one core with a rounding radius, as all shapes but meshes are."""
-        return self.kind != MESH
+        """Whether it is one core with a rounding radius, as all shapes but meshes and compounds are."""
+        return self.kind not in (MESH, COMPOUND)
 
     @cached_property
     def face_normals(self) -> np.ndarray:

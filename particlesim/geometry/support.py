@@ -9,7 +9,7 @@ has turned already is a tuple (row, size, rotation matrix).
 
 import math
 
-from particlesim.core.constants import HALF_SPACE, MESH, SPHERE
+from particlesim.core.constants import COMPOUND, HALF_SPACE, MESH, SPHERE
 from particlesim.core.jit import kernel
 from particlesim.core.math3d import (
     dot,
@@ -151,9 +151,9 @@ def is_half_space(table, shape):
 
 
 @kernel
-def is_mesh(table, shape):
-    """Whether a shape is triangles, each of which is a shape by itself."""
-    return table.shape[shape].kind == MESH
+def has_parts(table, shape):
+    """Whether a shape is a mesh or a compound, whose triangles or parts are shapes by themselves."""
+    return table.shape[shape].kind == MESH or table.shape[shape].kind == COMPOUND
 
 
 @kernel

@@ -28,7 +28,12 @@ class Surface(NamedTuple):
 
 
 def surface_of(shape: Shape, splits: int = SPLITS) -> Surface:
-    """The surface of a bounded shape: exact of polyhedra, of what is round its hull with corners on the surface."""
+    """The surface of a bounded shape: exact of polyhedra, of what is round its hull with corners on the surface.
+
+    That of a compound is the surfaces of its parts, also where they are within each other.
+    """
+    if shape.parts:
+        return _together([surface_of(part, splits) for part in shape.parts])
     if shape.rounding == 0.0:
         face, corners = triangles_of(shape.faces)
         normals = np.repeat(shape.face_normals[face], 3, axis=0)
@@ -41,3 +46,11 @@ def surface_of(shape: Shape, splits: int = SPLITS) -> Surface:
     triangles = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
     used, numbers = np.unique(triangles, return_inverse=True)
     return Surface(points[used], ball[used % len(ball)], numbers.reshape(-1, 3))
+
+
+def _together(surfaces: list[Surface]) -> Surface:
+    """Several surfaces as one."""
+    ends = np.cumsum([len(surface.vertices) for surface in surfaces])
+    triangles = [s.triangles + end - len(s.vertices) for s, end in zip(surfaces, ends, strict=True)]
+    vertices, normals = ([getattr(s, name) for s in surfaces] for name in ("vertices", "normals"))
+    return Surface(np.concatenate(vertices), np.concatenate(normals), np.concatenate(triangles))

@@ -134,6 +134,10 @@ TRIANGLES_OF_LEAF = 4
 # them. Smaller: rounding, in a mesh a million times as large as what touches it, hides real contacts.
 NORMAL_SINE = 1e-8
 
+# How far above a smooth place on a part of a compound another part hides it, as a fraction of the radius about it [1].
+# Larger: faces beside steps lower than that are lost. Smaller: faces that two parts share are walls inside of them.
+HIDDEN_ABOVE = 1e-6
+
 # Fraction of the extent of a patch on several triangles by which a point must stand out from the others to be a corner:
 # two orders above ON_EDGE, by which points of neighbouring triangles differ. Smaller: corners are there twice, and a
 # box that lands flat starts to spin. Larger: patches lose corners.

@@ -9,9 +9,9 @@ from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import dot, load_vec3, set_vec3, sub, to_vec3
 from particlesim.core.parallel import ThreadTeam
 from particlesim.geometry.narrow_phase.gjk import NO_SIMPLEX
-from particlesim.geometry.narrow_phase.mesh import mesh_separation
 from particlesim.geometry.narrow_phase.pair import pair_overlaps, pair_separation
-from particlesim.geometry.support import is_mesh
+from particlesim.geometry.narrow_phase.parts import parts_separation
+from particlesim.geometry.support import has_parts
 from particlesim.model.bodies import placed
 from particlesim.model.domain import nearest_image
 from particlesim.model.system import System
@@ -34,8 +34,8 @@ def overlaps_any(shapes, meshes, a, point, others, period, points):
         reach = a.radius + b.radius
         if dot(offset, offset) > reach * reach:
             continue
-        if meshes is not None and is_mesh(shapes, b.shape_row):
-            if mesh_separation(shapes, meshes, placed_a, placed(b), offset, points)[0] <= 0.0:
+        if meshes is not None and (has_parts(shapes, a.shape_row) or has_parts(shapes, b.shape_row)):
+            if parts_separation(shapes, meshes, placed_a, placed(b), offset, points)[0] <= 0.0:
                 return True
         elif pair_overlaps(shapes, placed_a, placed(b), offset, points):
             return True
@@ -68,16 +68,16 @@ def put_where_free(system, others, count, bodies, proposals):
 
 @kernel
 def separation_along(shapes, meshes, a, b, offset, points):
-    """Separation and normal of a convex shape and another, or a mesh, both placed (see ``mesh_separation``)."""
-    if meshes is not None and is_mesh(shapes, b[0]):
-        return mesh_separation(shapes, meshes, a, b, offset, points)
+    """Separation and normal of two placed shapes; of what has parts see ``parts_separation``."""
+    if meshes is not None and (has_parts(shapes, a[0]) or has_parts(shapes, b[0])):
+        return parts_separation(shapes, meshes, a, b, offset, points)
     separation, normal, _ = pair_separation(shapes, a, b, offset, NO_SIMPLEX, points)
     return separation, normal
 
 
 @entry_kernel
 def separation_of(system, i, j):
-    """Separation of bodies i < j where they are now [m]; from a mesh any above 0 if they are apart."""
+    """Separation of bodies i < j where they are now [m]; of what has parts any above 0 if they are apart."""
     system = without_refcounts(system)
     points = np.empty((MAX_MANIFOLD, 3))
     a, b = placed(system.body[i]), placed(system.body[j])
@@ -85,23 +85,27 @@ def separation_of(system, i, j):
 
 
 @entry_kernel
-def _mark_touching(system, pairs, touches, first, last):
+def _mark_touching(system, meshes, pairs, touches, first, last):
     """Mark which of the candidate pairs ``first .. last`` touch or overlap."""
     system, pairs, touches = without_refcounts((system, pairs, touches))
-    points = np.empty((MAX_MANIFOLD, 3))
+    points, shapes = np.empty((MAX_MANIFOLD, 3)), system.shapes
     for k in range(first, last):
         a, b = system.body[pairs[k, 0]], system.body[pairs[k, 1]]
         offset = offset_of(system, pairs[k, 0], pairs[k, 1])
         reach = a.radius + b.radius
-        touches[k] = dot(offset, offset) <= reach * reach and pair_overlaps(
-            system.shapes, placed(a), placed(b), offset, points
-        )
+        touches[k] = dot(offset, offset) <= reach * reach
+        if meshes is not None and (has_parts(shapes, a.shape_row) or has_parts(shapes, b.shape_row)):
+            touches[k] = touches[k] and separation_of(system, pairs[k, 0], pairs[k, 1]) <= 0.0
+        else:
+            touches[k] = touches[k] and pair_overlaps(shapes, placed(a), placed(b), offset, points)
 
 
 def touching_pairs(system: System, pairs: np.ndarray) -> np.ndarray:
     """The candidate pairs (m, 2) of bounded bodies that touch or overlap, in the order of ``pairs``."""
     touches = np.empty(len(pairs), dtype=np.bool_)
-    ThreadTeam(len(pairs)).each(lambda _, first, last: _mark_touching(system, pairs, touches, first, last), len(pairs))
+    ThreadTeam(len(pairs)).each(
+        lambda _, first, last: _mark_touching(system, system.meshes, pairs, touches, first, last), len(pairs)
+    )
     return pairs[touches]
 
 

@@ -108,7 +108,8 @@ class Renderer:
         """
         view = self._camera.view(frame.time)
         particles = instances_of(self._look.scene, self._look.header, frame, self._scenery.tables)
-        instances = self._scenery.amid(particles, frame.time)
+        parts, whole = self._scenery.in_parts(particles)
+        instances = self._scenery.amid(parts, frame.time)
         clusters = occlusion_clusters(instances.position, instances.tables.radius)
         shadow = shadow_map(self._seen_by(self._light, instances, clusters))
         ground = self._environment.ground(self._floor_light(particles))
@@ -117,7 +118,8 @@ class Renderer:
         def drawn(one: Pass) -> np.ndarray:
             projection = self._projection(view, one)
             buffer = rasterise(projection, instances, clusters)
-            paint = self._paint(view, frame, (particles, instances), seen_instances(buffer, len(instances.position)))
+            seen = seen_instances(buffer, len(instances.position))
+            paint = self._paint(view, frame, (particles, instances), whole, seen)
             lighting = self._light.in_view(projection, shadow)
             maps = self._light_maps(projection, instances, clusters, one) if self._quality.sky else None
             colours = shade(projection, buffer, instances, paint, lighting, ground, maps)
@@ -190,11 +192,16 @@ class Renderer:
         lit = shade(projection, seen, panes, paint, lighting, nothing)
         return scenery.seen_through(colours, buffer.inverse_depth, panes, seen, lit)
 
-    def _paint(self, view: View, frame: Frame, shown: tuple[Instances, Instances], seen: Seen) -> Paint:
-        """What those that are seen of the particles, and of these and obstacles, are coloured with."""
+    def _paint(
+        self, view: View, frame: Frame, shown: tuple[Instances, Instances], whole: np.ndarray, seen: Seen
+    ) -> Paint:
+        """What those that are seen of the particles, and of these and obstacles, are coloured with.
+
+        ``whole`` (m,) says which of the particles the first of the instances are of.
+        """
         particles, instances = shown
-        of_particles = seen.indices < len(particles.position)
-        indices = seen.indices[of_particles]
+        of_particles = seen.indices < len(whole)
+        indices = whole[seen.indices[of_particles]]
         light = np.ones(len(seen.indices))
         if self._ambient_occlusion is not None:
             light[of_particles] = self._ambient_occlusion.light(particles.position, indices, particles.source)

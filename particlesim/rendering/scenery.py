@@ -1,4 +1,4 @@
-"""The obstacles of a scene as a picture shows them: what hides, and what is seen through."""
+"""The obstacles of a scene as a picture shows them, what hides and what is seen through; particles part by part."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from particlesim.core.constants import TRIANGLE
 from particlesim.core.rotations import rotations_of
-from particlesim.geometry.shape_table import stack_shapes
+from particlesim.geometry.shape_table import middle_of, stack_shapes
 from particlesim.geometry.shapes import Shape
 from particlesim.rendering.shading.colour import parse
 from particlesim.rendering.visibility.geometry_tables import BODY, GeometryTables, geometry_tables, joined
@@ -42,6 +42,11 @@ class Scenery:
     def __init__(self, scene: Scene, header: Header) -> None:
         particles = geometry_tables(header)
         self.tables = particles._replace(shapes=stack_shapes((*header.shapes, *header.obstacles), drawn=True))
+        self._has_compounds = any(shape.parts for shape in header.shapes)
+        self._middle = np.zeros((len(self.tables.shapes.shape), 3))  # of parts of compounds, at size 1 [m]
+        for row, shape in zip(self.tables.shapes.shape, header.shapes, strict=False):
+            for number, part in enumerate(shape.parts, int(row["first_part"])):
+                self._middle[number] = middle_of(part)
         self._obstacles = obstacles_of(scene, header.obstacles)
         self._size = np.array([o.size if o.shape.is_bounded else 1.0 for o in self._obstacles])
         self._parts = [self._parts_of(k, shape, len(header.shapes) + k) for k, shape in enumerate(header.obstacles)]
@@ -56,7 +61,7 @@ class Scenery:
         shapes, size, middle = self.tables.shapes.shape, self._size[k], np.zeros((1, 3))
         rows = np.array([row])
         if not shape.is_convex:
-            rows = np.arange(shapes["first_triangle"][row], shapes["last_triangle"][row])
+            rows = np.arange(shapes["first_part"][row], shapes["last_part"][row])
             middle = size * shape.vertices[shape.triangles].mean(axis=1)
         body = np.zeros(len(rows), dtype=BODY)
         body["shape"], body["size"] = rows, size
@@ -76,6 +81,27 @@ class Scenery:
             position, orientation, GeometryTables(self.tables.shapes, body, radius, np.zeros(len(each))), which[each]
         )
 
+    def in_parts(self, particles: Instances) -> tuple[Instances, np.ndarray]:
+        """Particles as they are drawn, each part of a compound by itself; which of the particles each is of, (m,)."""
+        each = np.arange(len(particles.position))
+        if not self._has_compounds:
+            return particles, each
+        shapes, body = self.tables.shapes.shape, particles.tables.body
+        first, last = shapes["first_part"][body["shape"]], shapes["last_part"][body["shape"]]
+        compound = last > first
+        count = np.where(compound, last - first, 1)
+        each = np.repeat(each, count)
+        number = np.arange(len(each)) - np.repeat(np.cumsum(count) - count, count)
+        parts = body[each]
+        parts["shape"] = np.where(compound, first, body["shape"])[each] + number
+        orientation, of_size_1 = particles.orientation[each], shapes[["radius", "inradius"]][parts["shape"]]
+        middle = self._middle[parts["shape"]] * parts["size"][:, None]
+        tables = GeometryTables(
+            self.tables.shapes, parts, of_size_1["radius"] * parts["size"], of_size_1["inradius"] * parts["size"]
+        )
+        position = particles.position[each] + (rotations_of(orientation).apply(middle) if len(each) else middle)
+        return Instances(position, orientation, tables, particles.bodies(each)), each
+
     def amid(self, particles: Instances, time: float) -> Instances:
         """Instances of particles, and after them the opaque obstacles, whose source they are, at a time [s]."""
         if not len(self.opaque):
@@ -90,11 +116,10 @@ class Scenery:
         )
 
     def bodies_in(self, instances: Instances) -> np.ndarray:
-        """A number (m,) for each of instances that ``amid`` has made: the triangles of an obstacle have the same."""
-        number = np.arange(len(instances.position))
+        """A number (m,) for each of instances that ``amid`` has made: the parts and triangles of a body have the same."""
+        number = instances.bodies(np.arange(len(instances.position)))
         others = np.isin(instances.tables.body["shape"], self._obstacle_shapes)
-        number[others] = -1 - instances.bodies(number[others])
-        return number
+        return np.where(others, -1 - number, number)
 
     def casting(self, instances: Instances, behind: np.ndarray) -> Instances:
         """Instances as they cast shadows: triangles, which have no thickness, from ``behind`` (3,) themselves [m]."""

@@ -70,7 +70,7 @@ def obstruct(obstacles: Sequence[Obstacle], first_shape: int, first_material: in
         if o.moves:
             b["kind"], b["motion"] = KINEMATIC, sum(map(len, motions))
             motions.append(_motion_of(o))
-    bounded = np.array([o.shape.is_bounded and o.shape.is_convex for o in obstacles], dtype=bool)
+    bounded = np.array([o.shape.is_bounded and not len(o.shape.triangles) for o in obstacles], dtype=bool)
     return Obstructed(bodies[bounded], bodies[~bounded], np.concatenate(motions))
 
 

@@ -122,7 +122,7 @@ def _pass(known, insertion, mobility, pairs):
         a, b = body[pairs[k, 0]], body[pairs[k, 1]]
         offset = nearest_image(sub(to_vec3(b.position), to_vec3(a.position)), period)
         thickness = table.shape[a.shape_row].inradius * a.scale + table.shape[b.shape_row].inradius * b.scale
-        depth, way = _lack(table, None, a, b, offset, thickness, points)
+        depth, way = _lack(table, meshes, a, b, offset, thickness, points)
         share = mobility[pairs[k, 0]] / (mobility[pairs[k, 0]] + mobility[pairs[k, 1]])
         set_vec3(a.position, axpy(to_vec3(a.position), way, share))
         set_vec3(b.position, axpy(to_vec3(b.position), way, share - 1.0))

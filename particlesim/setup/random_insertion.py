@@ -18,7 +18,8 @@ from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import dot, sub, to_vec3
 from particlesim.core.records import record
 from particlesim.geometry.narrow_phase.pair import pair_overlaps
-from particlesim.geometry.support import is_sphere
+from particlesim.geometry.narrow_phase.parts import parts_separation
+from particlesim.geometry.support import has_parts, is_sphere
 from particlesim.model.bodies import placed
 from particlesim.model.domain import nearest_image
 from particlesim.model.overlap import overlaps_any
@@ -147,16 +148,21 @@ def refile(insertion, indices, number):
 
 
 @kernel
-def _overlap(table, a, b, offset, points):
+def _overlap(table, meshes, a, b, offset, points):
     """Whether two particles whose bounding spheres overlap do; the centroid of b is at ``offset`` from that of a."""
+    if meshes is not None and (has_parts(table, a.shape_row) or has_parts(table, b.shape_row)):
+        return parts_separation(table, meshes, placed(a), placed(b), offset, points)[0] <= 0.0
     if is_sphere(table, a.shape_row) and is_sphere(table, b.shape_row):
         return True
     return pair_overlaps(table, placed(a), placed(b), offset, points)
 
 
 @kernel
-def _overlaps_in(table, insertion, j, i, point, points):
-    """Whether particle i at ``point`` overlaps one in a bucket, of which j is the first."""
+def _overlaps_in(shapes, insertion, j, i, point, points):
+    """Whether particle i at ``point`` overlaps one in a bucket, of which j is the first.
+
+    ``shapes`` are the tables of shapes and of meshes.
+    """
     body = insertion.body
     period = to_vec3(insertion.space[0].period)
     radius = body[i].radius
@@ -164,20 +170,20 @@ def _overlaps_in(table, insertion, j, i, point, points):
         other = body[j]
         offset = nearest_image(sub(to_vec3(other.position), point), period)
         reach = radius + other.radius
-        if dot(offset, offset) <= reach * reach and _overlap(table, body[i], other, offset, points):
+        if dot(offset, offset) <= reach * reach and _overlap(shapes[0], shapes[1], body[i], other, offset, points):
             return True
         j = other.next
     return False
 
 
 @kernel
-def _overlaps_on(table, insertion, number, i, point, points):
+def _overlaps_on(shapes, insertion, number, i, point, points):
     """Whether particle i at ``point`` overlaps one that is found by the cells of level ``number``."""
     space, cells = insertion.space[0], to_vec3(insertion.level[number].cells)
     buckets = insertion.bucket
     # The cell of the point comes first: in a crowd most proposals fail there.
     first = buckets[_bucket_of(number, _cell_at(space, cells, point), len(buckets))]
-    if first >= 0 and _overlaps_in(table, insertion, first, i, point, points):
+    if first >= 0 and _overlaps_in(shapes, insertion, first, i, point, points):
         return True
     radius = insertion.body[i].radius
     x0, x1 = _cells_about(space, 0, cells[0], point[0], radius)
@@ -188,16 +194,16 @@ def _overlaps_on(table, insertion, number, i, point, points):
             for z in range(z0, z1 + 1):
                 first = buckets[_bucket_of(number, _wrapped(space, cells, (x, y, z)), len(buckets))]
                 # Most are empty, and a call that hands a table of shapes over takes longer than a look.
-                if first >= 0 and _overlaps_in(table, insertion, first, i, point, points):
+                if first >= 0 and _overlaps_in(shapes, insertion, first, i, point, points):
                     return True
     return False
 
 
 @kernel
-def _overlaps_any(table, insertion, i, point, points):
+def _overlaps_any(shapes, insertion, i, point, points):
     """Whether particle i at ``point`` overlaps any in place, those that are finer by the cells of its level."""
     for number in range(insertion.body[i].level, len(insertion.level)):
-        if insertion.level[number].in_place > 0 and _overlaps_on(table, insertion, number, i, point, points):
+        if insertion.level[number].in_place > 0 and _overlaps_on(shapes, insertion, number, i, point, points):
             return True
     return False
 
@@ -218,7 +224,7 @@ def try_in_place(known, insertion, indices, proposals):
         for attempt in range(proposals.shape[1]):
             point = to_vec3(proposals[k, attempt])
             if not (
-                _overlaps_any(table, insertion, i, point, points)
+                _overlaps_any((table, meshes), insertion, i, point, points)
                 or overlaps_any(table, meshes, insertion.body[i], point, obstacles, period, points)
             ):
                 for axis in range(3):

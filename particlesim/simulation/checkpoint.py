@@ -22,7 +22,7 @@ from particlesim.scene import Scene
 from particlesim.scene.file import SceneError, stored_scene
 from particlesim.simulation.flow import FlowState
 
-_FORMAT = 5
+_FORMAT = 6
 
 
 class CheckpointError(ValueError):
@@ -121,6 +121,7 @@ def _plain(array: np.ndarray) -> Any:
 def _described(shape: Shape) -> dict[str, Any]:
     """A shape as JSON, which keeps every bit of a float64."""
     values = {f.name: getattr(shape, f.name) for f in fields(shape)}
+    values["parts"] = [_described(part) for part in shape.parts]
     return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
 
 
@@ -130,5 +131,6 @@ def _shape(described: dict[str, Any]) -> Shape:
     vertices = np.array(described["vertices"], dtype=np.float64).reshape(-1, 3)
     faces = tuple(tuple(loop) for loop in described["faces"])
     triangles = np.array(described["triangles"], dtype=np.int64).reshape(-1, 3)
-    listed = {"faces": faces, "remarks": tuple(described["remarks"])}
+    parts = tuple(_shape(part) for part in described["parts"])
+    listed = {"faces": faces, "remarks": tuple(described["remarks"]), "parts": parts}
     return Shape(**{**described, **arrays, **listed, "vertices": vertices, "triangles": triangles})

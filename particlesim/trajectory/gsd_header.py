@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from particlesim.core.constants import BALL, CAPSULE, COMPOUND
 from particlesim.geometry.convex_hull import hull_polygons
 from particlesim.geometry.shapes import Shape, capsule, drawn_hull, principal_hull, sphere, tree_mesh
 from particlesim.trajectory.frames import Header
@@ -22,18 +23,7 @@ OLDER = "written by an older particlesim; simulate its scene again"
 def header_log(header: Header, changing: bool) -> dict[str, np.ndarray]:
     """What the schema has no place for; where numbers are ``changing``, masses of all particles that there ever are."""
     constants = {"mass": header.mass.astype(np.float32), "inertia": header.inertia.astype(np.float32)}
-    shapes = [
-        {
-            "name": s.name,
-            "vertices": s.vertices.tolist(),
-            "rounding": s.rounding,
-            "orientation": s.orientation.tolist(),
-            "volume": s.volume,
-            "moments": s.moments.tolist(),
-            "described_corners": s.described_corners,
-        }
-        for s in header.shapes
-    ]
+    shapes = [_described(s) for s in header.shapes]
     obstacles = [{name: _plain(getattr(s, name)) for name in _drawn(s)} for s in header.obstacles]
     return {
         LOG + "version": np.frombuffer(importlib.metadata.version("particlesim").encode(), dtype=np.uint8),
@@ -45,6 +35,23 @@ def header_log(header: Header, changing: bool) -> dict[str, np.ndarray]:
         LOG + "group": header.group.astype(np.int32),
         **{LOG + name: values for name, values in constants.items() if changing},
     }
+
+
+def _described(shape: Shape) -> dict[str, Any]:
+    """What is kept of a particle's shape."""
+    described = {
+        "name": shape.name,
+        "vertices": shape.vertices.tolist(),
+        "rounding": shape.rounding,
+        "orientation": shape.orientation.tolist(),
+        "volume": shape.volume,
+        "moments": shape.moments.tolist(),
+        "described_corners": shape.described_corners,
+    }
+    if not shape.parts:
+        return described
+    parts = [{name: _plain(getattr(part, name)) for name in _drawn(part)} for part in shape.parts]
+    return described | {"inradius": shape.inradius, "parts": parts}
 
 
 def read_header(chunks: Chunks) -> Header:
@@ -99,6 +106,8 @@ def _plain(value: Any) -> Any:
 def _read_shape(described: dict[str, Any]) -> Shape:
     """A shape from what header_log says of it: its core is a point, a segment or a polyhedron."""
     vertices = described["vertices"]
+    if "parts" in described:
+        return _read_compound(described)
     if len(vertices) < 2:
         return sphere()
     if len(vertices) == 2:
@@ -108,6 +117,35 @@ def _read_shape(described: dict[str, Any]) -> Shape:
     arrays = {key: np.array(described[key], dtype=np.float64).reshape(-1) for key in ("moments", "orientation")}
     volume, corners = float(described["volume"]), int(described["described_corners"])
     return principal_hull(name, core, rounding, volume=volume, described_corners=corners, **arrays)
+
+
+def _read_compound(described: dict[str, Any]) -> Shape:
+    """A compound from what header_log says of it."""
+    parts = tuple(_read_part(part) for part in described["parts"])
+    vertices, faces = hull_polygons(described["name"], np.array(described["vertices"], dtype=np.float64))
+    return Shape(
+        described["name"],
+        COMPOUND,
+        vertices,
+        faces,
+        0.0,
+        float(described["volume"]),
+        np.array(described["moments"], dtype=np.float64),
+        max(part.radius for part in parts),
+        float(described["inradius"]),
+        np.array(described["orientation"], dtype=np.float64),
+        parts=parts,
+    )
+
+
+def _read_part(described: dict[str, Any]) -> Shape:
+    """A part of a compound, which is only drawn: a point, a segment or a polyhedron that need not be in its middle."""
+    vertices, rounding = np.array(described["vertices"], dtype=np.float64), float(described["rounding"])
+    if len(vertices) > 2:
+        return drawn_hull(**described)
+    kind = BALL if len(vertices) == 1 else CAPSULE
+    radius, turn = float(np.linalg.norm(vertices, axis=1).max()) + rounding, np.array(described["orientation"])
+    return Shape(described["name"], kind, vertices, (), rounding, 1.0, np.ones(3), radius, rounding, turn)
 
 
 def checked_header(header: Header) -> Header:

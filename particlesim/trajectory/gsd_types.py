@@ -8,6 +8,7 @@ import numpy as np
 
 from particlesim.core.constants import CAPSULE, SPHERE
 from particlesim.geometry.shapes import Shape
+from particlesim.geometry.surface import surface_of
 from particlesim.trajectory.frames import Header
 
 # Other programs draw a shape for each type and do not scale it. Groups of more sizes than this get that many types,
@@ -53,6 +54,13 @@ def _size_classes(size: np.ndarray, most: int) -> list[np.ndarray]:
 def _gsd_shape(shape: Shape, size: float) -> dict[str, Any]:
     if shape.kind == SPHERE:
         return {"type": "Sphere", "diameter": size}
+    if shape.parts:
+        surface = surface_of(shape)
+        return {
+            "type": "Mesh",
+            "vertices": (surface.vertices * size).tolist(),
+            "indices": surface.triangles.tolist(),
+        }
     core, rounding = shape.vertices, shape.rounding
     if shape.kind == CAPSULE:
         core, rounding = _thin_prism(shape)

@@ -17,7 +17,7 @@ from particlesim.core.math3d import dot, norm, scale, sub, to_vec3
 from particlesim.core.records import record
 from particlesim.dynamics.ccd.time_of_impact import sphere_half_space_impact, sphere_sphere_impact
 from particlesim.dynamics.standing import SETTLES
-from particlesim.geometry.support import half_space_plane, is_mesh, is_sphere
+from particlesim.geometry.support import half_space_plane, is_half_space, is_sphere
 from particlesim.model.bodies import KINEMATIC, STATIC, angular_velocity, placed
 from particlesim.model.domain import nearest_image
 from particlesim.model.free_motion import free_acceleration
@@ -191,7 +191,7 @@ def cull_surroundings(system, standing, duration, first, last):
             continue
         for j in range(system.bounded, len(system.body)):
             time = LOOK_CLOSER
-            if not is_mesh(system.shapes, system.body[j].shape_row):
+            if is_half_space(system.shapes, system.body[j].shape_row):
                 time = _half_space_time(system, system.body[i], system.body[j], duration)
             if time < math.inf:
                 c = found[count]

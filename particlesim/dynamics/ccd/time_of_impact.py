@@ -109,7 +109,7 @@ def _core_radius(system, b):
 
 
 @kernel
-def _largest_angular_speed(b, path):
+def largest_angular_speed(b, path):
     """The largest angular speed of a free body [rad/s]: it keeps its angular momentum and its energy."""
     inertia = b.principal_inertia
     least = min(inertia[0], inertia[1], inertia[2])
@@ -120,7 +120,7 @@ def _largest_angular_speed(b, path):
 @kernel
 def _surface_speed(system, b, path):
     """The largest speed of a point of a body by its rotation [m/s]."""
-    return _core_radius(system, b) * _largest_angular_speed(b, path)
+    return _core_radius(system, b) * largest_angular_speed(b, path)
 
 
 @kernel
@@ -164,7 +164,7 @@ def _vertex_acceleration(system, b, path):
         min(whole / r, math.sqrt(twice / r)),
     )
     change = norm((abs(q - r) / p * y * z, abs(r - p) / q * z * x, abs(p - q) / r * x * y))
-    fastest = min(_largest_angular_speed(b, path), norm((x, y, z)))
+    fastest = min(largest_angular_speed(b, path), norm((x, y, z)))
     return radius * (fastest * fastest + change)
 
 

@@ -25,7 +25,7 @@ from particlesim.core.math3d import (
 from particlesim.dynamics.ccd.swept_bounds import largest_acceleration
 from particlesim.dynamics.settings import CHANGE_HANDED_ON
 from particlesim.geometry.narrow_phase.mesh import is_any_near
-from particlesim.geometry.support import half_space_plane, is_mesh, is_sphere
+from particlesim.geometry.support import half_space_plane, is_half_space, is_sphere
 from particlesim.model.bodies import KINEMATIC, angular_velocity, placed
 from particlesim.model.domain import nearest_image
 
@@ -80,7 +80,7 @@ def _approach_to_mesh(system, meshes, spin, i, j, duration):
 @kernel
 def _approach_to_surroundings(system, meshes, spin, i, j, duration):
     """How fast a particle nears a half-space or a mesh that it may meet in a time [s], 0 if it does not."""
-    if meshes is not None and is_mesh(system.shapes, system.body[j].shape_row):
+    if meshes is not None and not is_half_space(system.shapes, system.body[j].shape_row):
         return _approach_to_mesh(system, meshes, spin, i, j, duration)
     return _approach_to_plane(system, spin, i, j, duration)
 

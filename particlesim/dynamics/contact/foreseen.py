@@ -7,11 +7,12 @@ from particlesim.core.math3d import axpy, dot, norm, scale, sub
 from particlesim.core.math3d import to_vec3 as vec
 from particlesim.dynamics.contact.clearance import turning_speed
 from particlesim.dynamics.contact.lasting_contacts import reach_of
-from particlesim.dynamics.contact.mesh_ahead import comes_upon_triangle
+from particlesim.dynamics.contact.parts_ahead import comes_upon_part
 from particlesim.dynamics.contact.position_correction import travel
 from particlesim.geometry.narrow_phase.half_space import half_space_separation
 from particlesim.geometry.narrow_phase.pair import pair_nearer
-from particlesim.geometry.support import half_space_plane, is_mesh, is_sphere
+from particlesim.geometry.narrow_phase.parts import parts_nearer
+from particlesim.geometry.support import half_space_plane, has_parts, is_sphere
 from particlesim.model.bodies import angular_velocity, placed
 from particlesim.model.domain import nearest_image
 
@@ -34,9 +35,11 @@ def _ways(system, motion, ahead, carried, i):
 
 
 @kernel
-def _nearer(system, a, b, distance):
+def _nearer(system, meshes, a, b, distance):
     """Whether two bounded bodies, as their records have them, are nearer than a distance [m]."""
     offset = nearest_image(sub(vec(b.position), vec(a.position)), system.domain[0].period)
+    if meshes is not None and (has_parts(system.shapes, a.shape_row) or has_parts(system.shapes, b.shape_row)):
+        return parts_nearer(system.shapes, meshes, placed(a), placed(b), offset, distance)
     return pair_nearer(system.shapes, placed(a), placed(b), offset, distance)
 
 
@@ -56,9 +59,9 @@ def _meet(system, motion, ahead, carried, pair, clear):
     if not both:
         way = max(way, norm(sub(straight_b, straight_a)))
     way += turn_a + turn_b
-    if clear > way or not _nearer(system, system.body[i], system.body[j], way):
+    if clear > way or not _nearer(system, system.meshes, system.body[i], system.body[j], way):
         return False
-    return not both or _nearer(system, ahead[i], ahead[j], 0.0)
+    return not both or _nearer(system, system.meshes, ahead[i], ahead[j], 0.0)
 
 
 @kernel
@@ -78,9 +81,10 @@ def _meets_plane(system, motion, ahead, i, j):
 @kernel
 def _meets_surroundings(system, meshes, motion, ahead, i, j):
     """Whether a particle is in a half-space or a mesh by the end of the step, unknown to contacts."""
-    if meshes is not None and is_mesh(system.shapes, system.body[j].shape_row):
+    shapes, a, b = system.shapes, system.body[i], system.body[j]
+    if meshes is not None and (has_parts(shapes, a.shape_row) or has_parts(shapes, b.shape_row)):
         reach, _, lossless = reach_of(system, motion, i, j)
-        return not lossless and comes_upon_triangle(system, meshes, ahead, (i, j), reach)
+        return not lossless and comes_upon_part(system, meshes, ahead, (i, j), reach)
     return _meets_plane(system, motion, ahead, i, j)
 
 

@@ -24,7 +24,7 @@ from particlesim.dynamics.contact.contact import (
     work_of_obstacle,
 )
 from particlesim.dynamics.contact.law import has_friction, rest_threshold, restitution_of, surface_velocity
-from particlesim.dynamics.contact.mesh_contact import find_contacts
+from particlesim.dynamics.contact.part_contacts import find_contacts
 from particlesim.dynamics.contact.rough_impact import rough_impulse
 from particlesim.dynamics.settings import APPROACH_TOLERANCE, MAX_MANIFOLD_IMPULSES
 from particlesim.model.bodies import BODY, DYNAMIC, KINEMATIC, angular_velocity, angular_velocity_change, per_mass

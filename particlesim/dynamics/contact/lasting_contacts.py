@@ -30,8 +30,14 @@ from particlesim.dynamics.contact.clearance import turning_speed
 from particlesim.dynamics.contact.contact_records import CONTACT_POINT, CONTACT_TERMS, OF_B, OF_EDGES
 from particlesim.dynamics.contact.effective_mass import response, rolling_mass, tangential_mass
 from particlesim.dynamics.contact.law import rest_speed, rest_threshold, restitution_of
-from particlesim.dynamics.contact.mesh_patches import MAX_PATCH_POINTS, gather_patches, new_patches, patch_corners
 from particlesim.dynamics.contact.normal_owner import normal_owner, write_edges
+from particlesim.dynamics.contact.part_patches import (
+    MAX_PATCH_POINTS,
+    SEARCH_MARGIN,
+    gather_patches,
+    new_patches,
+    patch_corners,
+)
 from particlesim.dynamics.settings import (
     LOSSLESS_REST,
     MANIFOLD_MARGIN,
@@ -45,7 +51,7 @@ from particlesim.dynamics.settings import (
 )
 from particlesim.dynamics.solver_state import SolverState
 from particlesim.geometry.narrow_phase.pair import pair_manifold
-from particlesim.geometry.support import is_half_space, is_mesh, is_sphere
+from particlesim.geometry.support import has_parts, is_half_space, is_sphere
 from particlesim.model.bodies import BODY, placed
 from particlesim.model.domain import nearest_image
 
@@ -192,14 +198,14 @@ def _write_point(system, motion, p, terms, pair, arm, offset):
 
 
 @kernel
-def _add_points(system, motion, pair, b, patch, room, found, size):
+def _add_points(system, motion, pair, parts, patch, room, found, size):
     """Add the points of a patch (normal, offset, count, least gap, whether they rebound in full) to ``found``.
 
-    ``b`` is the second body, or of a mesh the triangle. Returns how many there are then; where what rebounds in full is
-    not still, none are added.
+    ``parts`` are the bodies, or those parts of them that touch. Returns how many there are then; where what rebounds in
+    full is not still, none are added.
     """
     normal, offset, count, clear, lossless = patch
-    a, (points, terms) = system.body[pair[0]], found
+    (a, b), (points, terms) = parts, found
     owner = normal_owner(system, a, b, normal)
     turning = 0.0 if lossless else _turning_slack(system, motion, pair, offset, owner)
     for k in range(count):
@@ -232,56 +238,63 @@ def add_contact(system, motion, pair, clear, room, found, size):
     if count == 0:
         return size, clear, lossless
     patch = normal, offset, count, clear, lossless
-    return _add_points(system, motion, pair, b, patch, room, found, size), clear, lossless
+    return _add_points(system, motion, pair, (a, b), patch, room, found, size), clear, lossless
 
 
 @kernel
-def _patch_points(patches, k, inradius, clear, room):
-    """Write the points of patch k on the particle's surface, and their gaps; how many there are.
+def _patch_points(patches, k, surface, deepest, room):
+    """Write the points of patch k, and their gaps; how many there are.
 
-    What seems deeper than any triangle is lies beside the mesh.
+    A ``surface`` of 0.5 is that of the first body, of 0 half way. What seems ``deepest`` or deeper lies beside a mesh.
     """
-    slope, kept, count = RESTITUTION_THRESHOLD_HEIGHT * inradius, np.empty((MAX_MANIFOLD, 4)), 0
-    normal, nearest = load_vec3(patches.normal, k), patches.nearest[k]
+    kept, count, normal, nearest = np.empty((MAX_MANIFOLD, 4)), 0, load_vec3(patches.normal, k), patches.nearest[k]
     for m in range(patch_corners(patches, k, kept)):
-        if kept[m, 3] >= clear - slope:
-            store_vec3(room.points, count, axpy(load_vec3(kept, m), normal, -0.5 * kept[m, 3]))
+        if kept[m, 3] >= deepest:
+            store_vec3(room.points, count, axpy(load_vec3(kept, m), normal, -surface * kept[m, 3]))
             room.gaps[count] = kept[m, 3]
             count += 1
-    if count > 0 and nearest[3] >= clear - slope:
-        middle = axpy((nearest[0], nearest[1], nearest[2]), normal, -0.5 * nearest[3])
+    if count > 0 and nearest[3] >= deepest:
+        middle = axpy((nearest[0], nearest[1], nearest[2]), normal, -surface * nearest[3])
         count = _with_nearest(room, count, middle, nearest[3], 0.0)
     return count
 
 
 @kernel
-def _add_mesh_contact(system, meshes, motion, pair, room, found, size):
-    """As ``add_contact``, of a particle and a mesh, but for how far apart they are. Room: for MAX_PATCH_POINTS more."""
+def _add_part_contacts(system, meshes, motion, pair, clear, room, found, size):
+    """As ``add_contact``, of two bodies of which one has parts. There must be room for MAX_PATCH_POINTS more."""
     i, j = pair
-    a, begin = system.body[i], size
+    a, b, begin = system.body[i], system.body[j], size
     reach, tilt, lossless = reach_of(system, motion, i, j)
-    limits, patches = (reach, tilt, min(reach, MANIFOLD_MARGIN * a.inradius)), new_patches()
-    offset, count, clear = gather_patches(system, meshes, a, system.body[j], limits, SAME_PATCH_SINE, patches)
-    triangle = np.empty(1, dtype=BODY)
-    triangle[0] = system.body[j]
+    if clear > reach:
+        return size, clear, lossless
+    inradius = min(a.inradius, b.inradius)
+    limits, patches = (reach, tilt, min(reach, MANIFOLD_MARGIN * inradius)), new_patches()
+    offset, count, least = gather_patches(system, meshes, a, b, limits, SAME_PATCH_SINE, patches)
+    # Parts that are farther apart have not been looked at.
+    clear = min(least, max((1.0 + SEARCH_MARGIN) * reach, norm(offset) - a.radius - b.radius))
+    parts, surface, deepest = np.empty(2, dtype=BODY), 0.5 if j >= system.bounded else 0.0, -np.inf
+    parts[0], parts[1] = a, b
+    if j >= system.bounded:
+        # Deeper than any triangle.
+        deepest = least - RESTITUTION_THRESHOLD_HEIGHT * inradius
     for k in range(count):
-        triangle[0].shape_row = patches.row[k]
-        points = _patch_points(patches, k, a.inradius, clear, room)
-        patch = load_vec3(patches.normal, k), offset, points, clear, lossless
+        parts[0].shape_row, parts[1].shape_row = patches.row[k, 0], patches.row[k, 1]
+        points = _patch_points(patches, k, surface, deepest, room)
+        patch = load_vec3(patches.normal, k), offset, points, least, lossless
         before = size
-        size = _add_points(system, motion, pair, triangle[0], patch, room, found, size)
+        size = _add_points(system, motion, pair, (parts[0], parts[1]), patch, room, found, size)
         if points > 0 and size == before:
-            return begin, lossless
-    return size, lossless
+            return begin, clear, lossless
+    return size, clear, lossless
 
 
 @kernel
-def _add_surroundings(system, meshes, motion, pair, room, found, size):
-    """As ``add_contact``, of a particle and a half-space or a mesh, but for how far apart they are."""
-    if meshes is not None and is_mesh(system.shapes, system.body[pair[1]].shape_row):
-        return _add_mesh_contact(system, meshes, motion, pair, room, found, size)
-    size, _, loose = add_contact(system, motion, pair, -np.inf, room, found, size)
-    return size, loose
+def _add_contacts(system, meshes, motion, pair, clear, room, found, size):
+    """As ``add_contact``, of any two bodies."""
+    shapes, a, b = system.shapes, system.body[pair[0]], system.body[pair[1]]
+    if meshes is not None and (has_parts(shapes, a.shape_row) or has_parts(shapes, b.shape_row)):
+        return _add_part_contacts(system, meshes, motion, pair, clear, room, found, size)
+    return add_contact(system, motion, pair, clear, room, found, size)
 
 
 @kernel
@@ -312,19 +325,19 @@ def contacts_of(system, neighbours, motion, search, indices, first, last):
                 continue
             if size + most > len(points):
                 points, terms = grow_records(points), grow_records(terms)
-            size, loose = _add_surroundings(system, system.meshes, motion, (i, j), room, (points, terms), size)
+            size, _, loose = _add_contacts(system, system.meshes, motion, (i, j), -np.inf, room, (points, terms), size)
             search.loose[i] |= loose
         for near in range(neighbours.start[place], neighbours.start[place + 1]):
             j = neighbours.body[neighbours.other[near]]
             if (held and motion.held[j]) or (search.round[j] >= 0 and (search.round[j] < now or j < i)):
                 continue
-            if size + MAX_MANIFOLD > len(points):
+            if size + most > len(points):
                 points, terms = grow_records(points), grow_records(terms)
             come, pair = search.displacement[i] + search.displacement[j], (min(i, j), max(i, j))
             if motion.held[pair[0]] and pair[1] < system.particles:
                 pair = pair[1], pair[0]
             clear = search.clearance[near] - come
-            size, clear, loose = add_contact(system, motion, pair, clear, room, (points, terms), size)
+            size, clear, loose = _add_contacts(system, system.meshes, motion, pair, clear, room, (points, terms), size)
             search.clearance[near] = clear + come
             search.loose[i] |= loose
     return points[:size], terms[:size]
@@ -362,11 +375,11 @@ def resting_on_obstacles(system, neighbours, motion, pulled, rests, first, last)
         lead = scale(sub(pull, gravity), ahead)
         for j in range(system.bounded, len(system.body)):
             if not rests[i]:
-                size, _ = _add_surroundings(system, system.meshes, motion, (i, j), room, (points, terms), 0)
+                size, _, _ = _add_contacts(system, system.meshes, motion, (i, j), -np.inf, room, (points, terms), 0)
                 rests[i] = _rests(terms, points, size, pull, lead)
         place = neighbours.place[i]
         for near in range(neighbours.start[place], neighbours.start[place + 1]):
             j = neighbours.body[neighbours.other[near]]
             if j >= system.particles and not rests[i]:
-                size, _, _ = add_contact(system, motion, (i, j), -np.inf, room, (points, terms), 0)
+                size, _, _ = _add_contacts(system, system.meshes, motion, (i, j), -np.inf, room, (points, terms), 0)
                 rests[i] = _rests(terms, points, size, pull, lead)

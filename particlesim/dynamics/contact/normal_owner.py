@@ -9,7 +9,7 @@ from particlesim.dynamics.ccd.conservative_advancement import facing_edge
 from particlesim.dynamics.ccd.time_of_impact import sized_core
 from particlesim.dynamics.contact.contact_records import NOBODY, OF_A, OF_B, OF_EDGES
 from particlesim.dynamics.settings import LEVEL_VERTICES, MIN_EDGE_SINE, SAME_NORMAL
-from particlesim.geometry.support import is_half_space, is_sphere
+from particlesim.geometry.support import is_half_space, is_point
 
 
 @kernel
@@ -34,7 +34,7 @@ def normal_owner(system, a, b, normal):
     """
     if is_half_space(system.shapes, b.shape_row):
         return OF_B
-    sphere_a, sphere_b = is_sphere(system.shapes, a.shape_row), is_sphere(system.shapes, b.shape_row)
+    sphere_a, sphere_b = is_point(system.shapes, a.shape_row), is_point(system.shapes, b.shape_row)
     if sphere_a and sphere_b:
         return NOBODY
     if sphere_a or (not sphere_b and _faces(system, b, scale(normal, -1.0))):

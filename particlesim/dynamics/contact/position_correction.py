@@ -34,7 +34,7 @@ from particlesim.core.math3d import (
 from particlesim.core.math3d import to_vec3 as vec
 from particlesim.dynamics.contact.cone_solver import turned_by
 from particlesim.dynamics.contact.contact import inverse_mass_at, normal_velocity_at, work_of_obstacle
-from particlesim.dynamics.contact.mesh_ahead import mesh_contact_ahead
+from particlesim.dynamics.contact.parts_ahead import parts_contact_ahead
 from particlesim.dynamics.settings import (
     CORRECTED_DEPTH,
     CORRECTION_ROUNDS,
@@ -44,7 +44,7 @@ from particlesim.dynamics.settings import (
     TIMES_HELD_BACK,
 )
 from particlesim.geometry.narrow_phase.pair import pair_contact
-from particlesim.geometry.support import is_mesh, is_sphere
+from particlesim.geometry.support import has_parts, is_sphere
 from particlesim.model.bodies import KINEMATIC, placed
 from particlesim.model.domain import nearest_image
 from particlesim.model.free_motion import path_of_body, place_on_path, set_pose
@@ -126,8 +126,8 @@ def _may_sink(system, ahead, pair):
 def _contact_ahead(system, meshes, ahead, pair, room):
     """Separation, normal, offset and middle of the contact points, of a pair as it is ahead."""
     a, b = ahead[pair.a], ahead[pair.b]
-    if meshes is not None and is_mesh(system.shapes, b.shape_row):
-        return mesh_contact_ahead(system, meshes, ahead, (pair.a, pair.b), room)
+    if meshes is not None and (has_parts(system.shapes, a.shape_row) or has_parts(system.shapes, b.shape_row)):
+        return parts_contact_ahead(system, meshes, ahead, (pair.a, pair.b), room)
     offset = nearest_image(sub(vec(b.position), vec(a.position)), system.domain[0].period)
     separation, normal, count = pair_contact(system.shapes, placed(a), placed(b), offset, room)
     middle = (0.0, 0.0, 0.0)

@@ -22,7 +22,7 @@ from particlesim.geometry.narrow_phase.contact_manifold import MAX_CORNERS, supp
 from particlesim.geometry.support import (
     bounding_radius,
     half_space_plane,
-    is_sphere,
+    is_point,
     rounding_of,
     support_distance,
     turned,
@@ -54,8 +54,8 @@ def half_space_contact(table, a, b, offset, points):
     """
     separation, normal = half_space_separation(table, a, b, offset)
     rounding = rounding_of(table, a)
-    if is_sphere(table, a[0]):
-        store_vec3(points, 0, scale(normal, rounding))
+    if is_point(table, a[0]):
+        store_vec3(points, 0, axpy(vertex_position(table, turned(a), table.shape[a[0]].first_vertex), normal, rounding))
         return separation, normal, 1
     feature = np.empty((MAX_CORNERS, 3))
     count, _ = support_feature(table, turned(a), (0.0, 0.0, 0.0), normal, PARALLEL_TOLERANCE, feature)

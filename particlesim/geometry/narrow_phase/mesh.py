@@ -6,13 +6,8 @@ that leans back. The floor has no such normal. A mesh has a normal at a vertex, 
 farther that way from there: none of the triangles there leans over to where the normal points.
 """
 
-import math
-
 from particlesim.core.jit import kernel
 from particlesim.core.math3d import dot, inverse_rotate, load_vec3, norm, scale, sub, to_vec3
-from particlesim.geometry.narrow_phase.gjk import NO_SIMPLEX
-from particlesim.geometry.narrow_phase.pair import pair_separation
-from particlesim.geometry.support import bounding_radius
 from particlesim.geometry.tolerances import NORMAL_SINE
 from particlesim.geometry.triangle_tree import next_leaf, triangles_of
 
@@ -120,24 +115,6 @@ def face_towards(table, row, direction):
     """The unit normal of the triangle in a ``row`` of the shape table, on the side that ``direction`` points to."""
     normal = to_vec3(table.face[table.shape[row].first_face].normal)
     return normal if dot(normal, direction) >= 0.0 else scale(normal, -1.0)
-
-
-@kernel
-def mesh_separation(table, meshes, a, b, offset, points):
-    """How deep a convex shape is in mesh b at ``offset`` from it, both placed, as a separation below 0; the normal.
-
-    Apart, it is some number above 0: only triangles near the shape are looked at. ``points`` is scratch.
-    """
-    centre = scale(offset, -1.0)
-    box = box_about(b, centre, centre, bounding_radius(table, a))
-    least, deepest = math.inf, (0.0, 0.0, 0.0)
-    place, row = next_triangle(table, meshes, b[0], (0, 0), box)
-    while row >= 0:
-        found, normal, _ = pair_separation(table, a, (row, b[1], b[2]), offset, NO_SIMPLEX, points)
-        if found < least:
-            least, deepest = found, normal
-        place, row = next_triangle(table, meshes, b[0], place, box)
-    return least, deepest
 
 
 @kernel

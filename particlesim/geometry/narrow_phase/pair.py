@@ -24,6 +24,8 @@ from particlesim.geometry.support import (
     is_point,
     is_sphere,
     rounding_of,
+    turned,
+    vertex_position,
 )
 from particlesim.geometry.tolerances import PARALLEL_TOLERANCE
 
@@ -65,9 +67,12 @@ def _has_point(table, a, b):
 def _point_contact(table, a, b, contact, points):
     """Write the contact point of two shapes of which one has a point for a core (see contact_manifold); returns 1."""
     offset, normal, separation, _ = contact
-    nearest = scale(normal, rounding_of(table, a) + 0.5 * separation)
-    if not is_point(table, a[0]):
-        nearest = axpy(offset, normal, -(rounding_of(table, b) + 0.5 * separation))
+    if is_point(table, a[0]):
+        centre = vertex_position(table, turned(a), table.shape[a[0]].first_vertex)
+        nearest = axpy(centre, normal, rounding_of(table, a) + 0.5 * separation)
+    else:
+        centre = add(offset, vertex_position(table, turned(b), table.shape[b[0]].first_vertex))
+        nearest = axpy(centre, normal, -(rounding_of(table, b) + 0.5 * separation))
     store_vec3(points, 0, nearest)
     return 1
 

@@ -1,24 +1,27 @@
-"""The contacts of a particle with a mesh at one moment: one for each normal with which the mesh is touched."""
+"""The contacts of bodies of which one has parts at one moment: one for each normal with which they touch."""
 
 from __future__ import annotations
+
+import math
 
 from particlesim.core.jit import kernel
 from particlesim.core.math3d import load_vec3
 from particlesim.dynamics.contact.contact import find_contact, write_contact
-from particlesim.dynamics.contact.mesh_patches import gather_patches, new_patches, patch_corners
+from particlesim.dynamics.contact.part_patches import gather_patches, new_patches, patch_corners
 from particlesim.dynamics.settings import MESH_TOUCH
-from particlesim.geometry.support import is_mesh
+from particlesim.geometry.support import has_parts
 from particlesim.geometry.tolerances import NORMAL_SINE, PARALLEL_TOLERANCE
 
 
 @kernel
-def _find_mesh_contacts(system, meshes, moment, c, total):
-    """Fill in contact ``c``, of a particle and a mesh, and those of other normals after the ``total``; how many then.
+def _find_part_contacts(system, meshes, moment, c, total):
+    """Fill in contact ``c``, of bodies that have parts, and those of other normals after the ``total``; how many then.
 
     Where nothing is touched it has no points.
     """
     a, b = moment.actor[moment.contact[c].a], moment.actor[moment.contact[c].b]
-    patches, limits = new_patches(), (MESH_TOUCH * a.scale, PARALLEL_TOLERANCE, 0.0)
+    sizes = a.scale if b.inradius == math.inf else a.scale + b.scale
+    patches, limits = new_patches(), (MESH_TOUCH * sizes, PARALLEL_TOLERANCE, 0.0)
     offset, count, _ = gather_patches(system, meshes, a, b, limits, NORMAL_SINE, patches)
     write_contact(moment.contact[c], (0.0, 0.0, 1.0), offset, 0)
     for k in range(count):
@@ -41,8 +44,8 @@ def find_contacts(system, meshes, moment, count):
     for c in range(count):
         contact = moment.contact[c]
         a, b = moment.actor[contact.a], moment.actor[contact.b]
-        if meshes is not None and is_mesh(system.shapes, b.shape_row):
-            total = _find_mesh_contacts(system, meshes, moment, c, total)
+        if meshes is not None and (has_parts(system.shapes, a.shape_row) or has_parts(system.shapes, b.shape_row)):
+            total = _find_part_contacts(system, meshes, moment, c, total)
         else:
             find_contact(system, a, b, contact, moment.points[c])
     return total
