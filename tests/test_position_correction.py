@@ -12,8 +12,12 @@ from particlesim.dynamics.contact.movers import write_mover
 from particlesim.dynamics.contact.position_correction import correct_positions
 from particlesim.dynamics.settings import CORRECTED_DEPTH, HELD_BACK_DEPTH
 from particlesim.model.bodies import angular_velocities
+from particlesim.setup.build import build
+from particlesim.setup.obstacles import Obstacle
 from tests.kernels import callable_from_python
+from tests.meshes import ground
 from tests.touching import contact_of, nearly_touching
+from tests.worlds import listed, scene
 
 correct = callable_from_python(correct_positions)
 write = callable_from_python(write_mover)
@@ -74,6 +78,27 @@ def test_what_is_deep_in_each_other_collides_and_is_held_back(shapes):
         turned = [(b["angular_momentum"] ** 2 / b["principal_inertia"]).sum() for b in (before, ahead)]
         if all(shape in ("sphere", "cube") for shape in shapes):
             assert energies[1] + turned[1] <= (energies[0] + turned[0]) * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("shape", ["sphere", "cube"])
+@pytest.mark.parametrize("way", [0.2, 0.6, 3.0])
+def test_what_would_be_beyond_a_sheet_is_held_back_on_its_side(shape, way):
+    """Its middle before the sheet, behind it, or all of it: there nothing touches, and it must not be pushed on."""
+    lying = scene(listed(shape, {"position": (0.1, 0.2, 0.2501)}, size=0.5), boundary="open", restitution=0.0)
+    system = build(lying, [Obstacle(ground(6, 2.0), (0, 0, 0))]).system
+    points, terms = np.zeros(1, dtype=CONTACT_POINT), np.zeros(1, dtype=CONTACT_TERMS)
+    points["b"], terms["inradius"], terms["separation"] = 1, 0.25, 1e-4
+    islands = Islands(
+        np.array([0, 1]), points, terms, np.array([0, 1]), np.zeros(1, np.int64), np.zeros((1, 4)), np.zeros(1)
+    )
+    ahead, mover = system.body.copy(), np.zeros(2, dtype=MOVER)
+    ahead["position"][0, 2] -= way
+    ahead["velocity"][0] = 0.0, 0.0, -240.0 * way
+    for k, row in enumerate((0, -1)):
+        write(mover[k], system.body[k], row)
+    assert correct(system, islands, mover, (0, 1), ahead, 1)
+    assert -HELD_BACK_DEPTH * 0.25 <= ahead["position"][0, 2] - 0.25 <= 1e-4
+    assert ahead["velocity"][0] == pytest.approx(np.zeros(3), abs=1e-9 * 240.0 * way)
 
 
 def test_what_does_not_go_as_its_velocity_says_is_seen_to_change():

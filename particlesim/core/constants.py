@@ -12,6 +12,9 @@ TRIANGLE = 5
 COMPOUND = 6
 BALL = 7
 
+# Parts of a compound at most: each may have to be looked at with each of another's.
+MAX_PARTS = 256
+
 # Metres in the units of length that a mesh file may be in.
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 

@@ -44,7 +44,7 @@ class Scenery:
         self.tables = particles._replace(shapes=stack_shapes((*header.shapes, *header.obstacles), drawn=True))
         self._has_compounds = any(shape.parts for shape in header.shapes)
         self._middle = np.zeros((len(self.tables.shapes.shape), 3))  # of parts of compounds, at size 1 [m]
-        for row, shape in zip(self.tables.shapes.shape, header.shapes, strict=False):
+        for row, shape in zip(self.tables.shapes.shape, (*header.shapes, *header.obstacles), strict=False):
             for number, part in enumerate(shape.parts, int(row["first_part"])):
                 self._middle[number] = middle_of(part)
         self._obstacles = obstacles_of(scene, header.obstacles)
@@ -57,12 +57,12 @@ class Scenery:
         self.clear = np.flatnonzero((self._opacity > 0.0) & (self._opacity < 1.0))
 
     def _parts_of(self, k: int, shape: Shape, row: int) -> _Parts:
-        """What obstacle ``k`` is drawn as, whose shape has a ``row`` of the table: that, or the triangles of a mesh."""
+        """What obstacle ``k`` is drawn as, whose shape has a ``row`` of the table: that, or all that it consists of."""
         shapes, size, middle = self.tables.shapes.shape, self._size[k], np.zeros((1, 3))
         rows = np.array([row])
         if not shape.is_convex:
             rows = np.arange(shapes["first_part"][row], shapes["last_part"][row])
-            middle = size * shape.vertices[shape.triangles].mean(axis=1)
+            middle = size * (self._middle[rows] if shape.parts else shape.vertices[shape.triangles].mean(axis=1))
         body = np.zeros(len(rows), dtype=BODY)
         body["shape"], body["size"] = rows, size
         return _Parts(middle, body, shapes["radius"][rows] * size)

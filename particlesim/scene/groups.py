@@ -12,11 +12,12 @@ from pydantic import (
     model_validator,
 )
 
-from particlesim.core.constants import UNITS
+from particlesim.core.constants import MAX_PARTS, UNITS
 from particlesim.core.polyhedra import POLYHEDRA
 from particlesim.scene.base import (
     MAX_COUNT,
     File,
+    Flag,
     Model,
     NotNegative,
     Positive,
@@ -28,8 +29,8 @@ from particlesim.scene.base import (
     whole,
 )
 from particlesim.scene.colours import COLOUR_WORDS, GroupColour
-from particlesim.scene.messages import must_be, one_of
-from particlesim.scene.placements import AnyOrientation, ListPlacement, Placement, RandomPlacement
+from particlesim.scene.messages import listed, must_be, one_of
+from particlesim.scene.placements import AnyOrientation, ListPlacement, Orientation, Placement, RandomPlacement
 from particlesim.scene.surface import Surface
 
 # The scene file names polyhedra without parameters as core.polyhedra does.
@@ -101,24 +102,61 @@ Unit = Annotated[_AnyUnit, one_of(*UNITS)]
 
 
 class MeshShape(Model):
-    """The convex hull of an STL, OBJ or PLY file, times the size. Paths start at the scene file's folder."""
+    """The convex hull of an STL, OBJ or PLY file, or convex parts of it, times the size.
+
+    Paths start at the scene file's folder.
+    """
 
     kind: Literal["mesh"]
     file: Annotated[File, AfterValidator(mesh_file)] = Field(description="path from the scene's folder")
     unit: Unit = Field(default="m", description="of the numbers in the file")
     rounding: Rounding = Field(default=0.0, description=_ROUNDING)
+    decompose: Flag = Field(default=False, description="a compound of convex parts, not the hull; needs coacd")
+
+    @model_validator(mode="after")
+    def _hull_or_parts(self) -> MeshShape:
+        if self.decompose and self.rounding:
+            raise ValueError("rounding does not go with decompose")
+        return self
 
 
 Solids = SphereShape | CapsuleShape | CylinderShape | ConeShape | PolyhedronShape | BoxShape | PyramidShape
-Shapes = Solids | MeshShape
+Convex = Solids | MeshShape
+_WORDS = 'a shape such as "sphere", or a table such as { kind = "box", edges = [1, 2, 3] }'
+
+
+def _or_word(kinds: Any) -> BeforeValidator:
+    """Read a word as the kind of a shape that has no other keys."""
+    return shorthand(_WORDS, kinds | Literal["sphere", "cylinder", "cone", "pyramid"] | _PolyhedronName)
+
+
+_Convex = Annotated[Convex, Field(discriminator="kind")]
+
+
+class Part(Model):
+    """One of the shapes that a compound consists of."""
+
+    shape: Annotated[_Convex, _or_word(_Convex)] = Field(description="convex, at size 1")
+    size: Positive = Field(default=1.0, description="factor on the shape, times that of the particle")
+    position: Vector = Field(default=(0.0, 0.0, 0.0), description="of its centroid, times the size of the particle [m]")
+    orientation: Orientation = Field(default=(1.0, 0.0, 0.0, 0.0), description="how it is turned")
+
+
+class CompoundShape(Model):
+    """Several convex shapes as one body, which need not be convex, times the size. Its position is its centroid.
+
+    Mass and inertia are sums over the parts: where two overlap, both are there.
+    """
+
+    kind: Literal["compound"]
+    parts: Annotated[list[Part], Field(min_length=1, max_length=MAX_PARTS)] = Field(
+        description="where each of them is, in axes of the compound"
+    )
+
+
+Shapes = Convex | CompoundShape
 _Shapes = Annotated[Shapes, Field(discriminator="kind")]
-AnyShape = Annotated[
-    _Shapes,
-    shorthand(
-        'a shape such as "sphere", or a table such as { kind = "box", edges = [1, 2, 3] }',
-        _Shapes | Literal["sphere", "cylinder", "cone", "pyramid"] | _PolyhedronName,
-    ),
-]
+AnyShape = Annotated[_Shapes, _or_word(_Shapes)]
 
 
 class FixedSize(Model):

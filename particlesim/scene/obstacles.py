@@ -24,7 +24,7 @@ from particlesim.scene.base import (
     mesh_file,
     shorthand,
 )
-from particlesim.scene.groups import Solids, Unit
+from particlesim.scene.groups import CompoundShape, Solids, Unit
 from particlesim.scene.placements import Orientation, not_zero
 from particlesim.scene.surface import Surface
 
@@ -66,7 +66,7 @@ class HeightfieldShape(Model):
 
 Surfaces = SurfaceShape | HeightfieldShape
 
-_ObstacleShapes = Annotated[PlaneShape | Solids | Surfaces, Field(discriminator="kind")]
+_ObstacleShapes = Annotated[PlaneShape | Solids | CompoundShape | Surfaces, Field(discriminator="kind")]
 ObstacleShape = Annotated[
     _ObstacleShapes,
     shorthand(

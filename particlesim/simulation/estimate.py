@@ -97,7 +97,7 @@ def _mesh_rows(simulation: Simulation) -> list[tuple[str, str]]:
     """What obstacles that are meshes amount to, and what is odd about each."""
     scene, rows = simulation.scene, []
     for k, (said, shape) in enumerate(zip(scene.obstacles, simulation.model.obstacle_shapes, strict=True)):
-        if shape.is_convex:
+        if not len(shape.triangles):
             continue
         extent = np.ptp(shape.vertices, axis=0) * said.size
         spans = " x ".join(f"{length:.3g}" for length in extent)
@@ -121,7 +121,7 @@ def _group(simulation: Simulation, members: np.ndarray) -> str:
     shape, sizes = simulation.model.shapes[int(members["shape_row"][0])], members["scale"]
     span = f"{sizes.min():g}" if sizes.min() == sizes.max() else f"{sizes.min():g} to {sizes.max():g}"
     mass = f"{members['mass'].sum():.4g} kg{' in all' if len(members) > 1 else ''}"
-    return f"{len(members):,} x {shape.name}, size {span}, mass {mass}"
+    return "; ".join([f"{len(members):,} x {shape.name}, size {span}, mass {mass}", *shape.remarks])
 
 
 def _volume(simulation: Simulation) -> float:

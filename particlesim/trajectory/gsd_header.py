@@ -24,7 +24,9 @@ def header_log(header: Header, changing: bool) -> dict[str, np.ndarray]:
     """What the schema has no place for; where numbers are ``changing``, masses of all particles that there ever are."""
     constants = {"mass": header.mass.astype(np.float32), "inertia": header.inertia.astype(np.float32)}
     shapes = [_described(s) for s in header.shapes]
-    obstacles = [{name: _plain(getattr(s, name)) for name in _drawn(s)} for s in header.obstacles]
+    obstacles = [
+        _described(s) if s.parts else {name: _plain(getattr(s, name)) for name in _drawn(s)} for s in header.obstacles
+    ]
     return {
         LOG + "version": np.frombuffer(importlib.metadata.version("particlesim").encode(), dtype=np.uint8),
         LOG + "scene": np.frombuffer(header.scene_json.encode(), dtype=np.uint8),
@@ -84,7 +86,9 @@ def _read_obstacles(chunks: Chunks) -> list[dict[str, Any]]:
 
 
 def _read_obstacle(described: dict[str, Any]) -> Shape:
-    """A shape that is only drawn, from its core: a point, a segment or a polyhedron."""
+    """A shape that is only drawn, from its core: a point, a segment or a polyhedron; of a compound all of it."""
+    if "parts" in described:
+        return _read_compound(described)
     if "triangles" in described:
         return tree_mesh(
             described["name"], np.array(described["vertices"]), np.array(described["triangles"], dtype=np.int64)
