@@ -27,7 +27,8 @@ def island(system):
     """The island of two bodies that are in contact somewhere."""
     points, terms = np.zeros(1, dtype=CONTACT_POINT), np.zeros(1, dtype=CONTACT_TERMS)
     points["b"], terms["inradius"] = 1, system.body["inradius"][:2].min()
-    terms["separation"] = contact_of(system, system.body)[0]
+    terms["separation"], contact, _ = contact_of(system, system.body)
+    points["normal"] = contact["normal"]
     return Islands(np.array([0, 1]), points, terms, np.array([0, 2]), np.arange(2), np.zeros((1, 4)), np.zeros(1))
 
 

@@ -20,11 +20,13 @@ from particlesim.core.math3d import (
     conjugate,
     cross,
     dot,
+    inverse_rotate,
     load_vec3,
     norm,
     quat_from_rotvec,
     quat_multiply,
     quat_normalize,
+    rotate,
     scale,
     set_quat,
     set_vec3,
@@ -34,17 +36,20 @@ from particlesim.core.math3d import (
 from particlesim.core.math3d import to_vec3 as vec
 from particlesim.dynamics.contact.cone_solver import turned_by
 from particlesim.dynamics.contact.contact import inverse_mass_at, normal_velocity_at, work_of_obstacle
+from particlesim.dynamics.contact.contact_records import OF_A, OF_B
 from particlesim.dynamics.contact.parts_ahead import parts_contact_ahead
 from particlesim.dynamics.settings import (
     CORRECTED_DEPTH,
     CORRECTION_ROUNDS,
+    GAP_ROUNDING,
     HELD_BACK_DEPTH,
     LIFT_SHARE,
     MAX_CORRECTION,
     TIMES_HELD_BACK,
 )
+from particlesim.geometry.narrow_phase.half_space import half_space_separation
 from particlesim.geometry.narrow_phase.pair import pair_contact
-from particlesim.geometry.support import has_parts, is_sphere
+from particlesim.geometry.support import has_parts, is_half_space, is_sphere, support_distance
 from particlesim.model.bodies import KINEMATIC, placed
 from particlesim.model.domain import nearest_image
 from particlesim.model.free_motion import path_of_body, place_on_path, set_pose
@@ -60,6 +65,8 @@ class Pair(NamedTuple):
     gap: float  # at the start [m]
     least: float  # at the end [m]
     inradius: float  # [m]
+    normal: tuple[float, float, float]  # at the start
+    owner: int  # whose face it turns with (see contact_records.py)
 
 
 @entry_kernel
@@ -99,7 +106,7 @@ def _pair_of(islands, first, depth):
     least = min(-depth * t.inradius, t.separation)
     if depth == CORRECTED_DEPTH:
         least = min(-depth * t.inradius, (1.0 - LIFT_SHARE) * t.separation)
-    return Pair(p.a, p.b, t.separation, least, t.inradius)
+    return Pair(p.a, p.b, t.separation, least, t.inradius, vec(p.normal), t.owner)
 
 
 @kernel
@@ -120,6 +127,34 @@ def _may_sink(system, ahead, pair):
     shift_a, turn_a = travel(system, ahead, pair.a)
     shift_b, turn_b = travel(system, ahead, pair.b)
     return pair.gap - norm(sub(shift_b, shift_a)) - turn_a - turn_b < pair.least
+
+
+@kernel
+def _turned_ahead(b, then, vector):
+    """A vector that turns with a body to where it is ahead."""
+    return rotate(to_quat(then.orientation), inverse_rotate(to_quat(b.orientation), vector))
+
+
+@kernel
+def _is_clear(system, ahead, pair):
+    """Whether the normal of a pair, turned with the face that it belongs to, shows that the two are far enough apart.
+
+    They are no less so than along any direction (separating axis theorem). It takes a tenth of the time of a contact.
+    """
+    a, b, normal = ahead[pair.a], ahead[pair.b], pair.normal
+    least = pair.least + GAP_ROUNDING * pair.inradius
+    if has_parts(system.shapes, a.shape_row) or has_parts(system.shapes, b.shape_row):
+        return False
+    offset = nearest_image(sub(vec(b.position), vec(a.position)), system.domain[0].period)
+    if is_half_space(system.shapes, b.shape_row):
+        return half_space_separation(system.shapes, placed(a), placed(b), offset)[0] >= least
+    if pair.owner == OF_A:
+        normal = _turned_ahead(system.body[pair.a], a, normal)
+    elif pair.owner == OF_B:
+        normal = _turned_ahead(system.body[pair.b], b, normal)
+    reach = support_distance(system.shapes, placed(a), normal)
+    reach += support_distance(system.shapes, placed(b), scale(normal, -1.0))
+    return dot(normal, offset) - reach >= least
 
 
 @kernel
@@ -227,6 +262,8 @@ def _look(system, mover, ahead, pair, moved, round_, room):
     of_a, of_b = mover[pair.a].row, mover[pair.b].row
     lately = max(moved[of_a], moved[of_b] if of_b >= 0 else 0)
     if (round_ == 1 and not _may_sink(system, ahead, pair)) or (round_ > 1 and lately < round_ - 1):
+        return math.inf, _STILL, _STILL, _STILL
+    if _is_clear(system, ahead, pair):
         return math.inf, _STILL, _STILL, _STILL
     return _contact_ahead(system, system.meshes, ahead, pair, room)
 
