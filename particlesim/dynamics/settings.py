@@ -202,21 +202,24 @@ SLEEP_SPEED = 1e-3
 # sweeps in all, and first-order errors are smaller.
 RESTING_SUBSTEPS = 4
 
-# Pairs of sweeps over the contact points of an island in each part: as many as make this number of visits to points in
-# the substep, which takes two milliseconds, but no more than MAX_SWEEPS. Thus few points, such as those of a tower, are
-# done to rounding: all points that push are solved together after every second pair of sweeps, by so many steps of
-# conjugate gradients at most. Points whose friction is within this fraction of its limit slide [1]; a way is cut short
-# by halves down to the last fraction where it leads out of a cone.
+# Pairs of sweeps over the contact points of an island in each part, along conjugate ways: as many as make this number
+# of visits to points in the substep, which takes two milliseconds, but no more than MAX_SWEEPS. Few points, such as
+# those of a tower, are done to rounding: all that push are solved together after every PAIRS_BETWEEN pairs of sweeps,
+# by so many steps of conjugate gradients at most. That takes as long as thirty pairs: where it gets less than
+# FAR_ENOUGH of its way [1], it is tried again after twice as many. Points whose friction is within this fraction of its
+# limit slide [1]; a way is cut short by halves down to the last fraction where it leads out of a cone.
 SWEEP_VISITS = 40_000
 MAX_SWEEPS = 400
+PAIRS_BETWEEN = 2
 GRADIENT_STEPS = 60
+FAR_ENOUGH = 0.5
 STICKING = 1e-9
 LEAST_SHARE = 1e-3
 
-# Where that leaves FEW_SWEEPS pairs or less, there are twice as many single sweeps as the second, along conjugate
-# ways, in each of so many parts as the third: a large heap starts from the forces of the part before and gets better
-# from one to the next, and with half as many sweeps in twice as many parts it is held better. So few has a second
-# answer, too, where impulses could grow for as long as they are looked for.
+# Where that leaves FEW_SWEEPS pairs or less, there are twice as many single sweeps as the second in each of so many
+# parts as the third, and nothing is solved together: a large heap starts from the forces of the part before and gets
+# better from one to the next, and with half as many sweeps in twice as many parts it is held better. So few has a
+# second answer, too, where impulses could grow for as long as they are looked for.
 FEW_SWEEPS = 4
 CONJUGATE_SWEEPS = 5
 LARGE_SUBSTEPS = 8

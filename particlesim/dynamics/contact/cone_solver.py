@@ -20,21 +20,25 @@ from particlesim.core.records import record
 from particlesim.dynamics.contact.conjugate_ways import go_on, length2_of, list_point, set_out
 from particlesim.dynamics.contact.contact_records import along_normal
 from particlesim.dynamics.settings import (
+    FAR_ENOUGH,
     FEW_SWEEPS,
     GRADIENT_STEPS,
     LEAST_SHARE,
+    PAIRS_BETWEEN,
     SAME_IMPULSES,
     STICKING,
     SWEEPS_OF_ALL,
 )
 
-# A body as the sweeps see it.
+# A body as the sweeps see it: all that they read is in the first two cache lines.
 MOVER = record(
     [
         ("velocity", "f8", (3,)),  # [m/s]
         ("spin", "f8", (3,)),  # angular velocity [rad/s]
         ("inverse_mass", "f8"),  # [1/kg]
         ("inverse_inertia", "f8", (6,)),  # world axes: xx, yy, zz, yz, zx, xy [1/(kg m^2)]
+        ("stirred", "i8"),  # the last sweep that changed its velocity by what counts
+        ("row", "i8"),  # its number among the members of its island, -1 of an obstacle
         ("shift", "f8", (3,)),  # displacement since the start of the step [m]
         ("turn", "f8", (3,)),  # and rotation [rad]
         ("before", "f8", (6,)),  # velocity and angular velocity at the start of the step
@@ -42,8 +46,6 @@ MOVER = record(
         ("trial_spin", "f8", (3,)),
         ("average", "f8", (6,)),  # velocity and angular velocity as a part of the step begins, then their means in it
         ("pull", "f8", (3,)),  # acceleration by gravity and fields [m/s^2]
-        ("stirred", "i8"),  # the last sweep that changed its velocity by what counts
-        ("row", "i8"),  # its number among the members of its island, -1 of an obstacle
     ]
 )
 
@@ -53,14 +55,15 @@ class Sweeps(NamedTuple):
 
     most: int  # pairs of sweeps, up and down
     small: float  # a change of velocities that ends them [m/s]
-    together: bool  # whether points are also solved together, or sweeps go on along conjugate ways
+    together: bool  # whether points are also solved together
     partly: bool  # whether most of these visit only the points that they may change
+    rolls: bool  # whether anything has rolling friction
 
 
 @kernel
 def briefly(sweeps):
     """As many sweeps as are made one by one."""
-    return Sweeps(min(sweeps.most, FEW_SWEEPS), sweeps.small, False, sweeps.partly)
+    return Sweeps(min(sweeps.most, FEW_SWEEPS), sweeps.small, False, sweeps.partly, sweeps.rolls)
 
 
 @kernel
@@ -126,6 +129,8 @@ def _visit(p, a, b):
     """
     velocity, normal = sub(relative_velocity(p, a, b), vec(p.wanted)), vec(p.normal)
     more = max(-p.push, -dot(normal, velocity) * p.normal_mass)
+    if more == 0.0 and p.push == 0.0 and dot(vec(p.drag), vec(p.drag)) == 0.0:
+        return 0.0
     p.push += more
     change, impulse = abs(more) / p.normal_mass, scale(normal, more)
     if p.static_friction > 0.0:
@@ -137,20 +142,6 @@ def _visit(p, a, b):
         impulse = add(impulse, across)
     if change > 0.0:
         give(p, a, b, impulse)
-    return change
-
-
-@kernel
-def _sweep(points, terms, mover, span, upwards):
-    """Visit the contact points of a ``span`` (first, last) in turn; the largest change of a velocity."""
-    first, last = span
-    change = 0.0
-    for step in range(last - first):
-        k = first + step if upwards else last - 1 - step
-        p = points[k]
-        change = max(change, _visit(p, mover[p.a], mover[p.b]))
-        if terms[k].rolling_friction > 0.0:
-            _resist_rolling(p, terms[k], mover[p.a], mover[p.b])
     return change
 
 
@@ -273,7 +264,7 @@ def _within_cones(points, span, change):
 
 @kernel
 def _together(points, mover, span, members, small):
-    """Let all points that push reach what they are to at once, as far as their cones allow."""
+    """Let all points that push reach what they are to at once, as far as their cones allow; returns how far that is."""
     change = _conjugate_gradients(points, mover, span, members, 0.1 * small)
     share = _within_cones(points, span, change)
     _try(points, mover, span, members, change)
@@ -288,58 +279,42 @@ def _together(points, mover, span, members, small):
             p.push = max(p.push + share * along, 0.0)
             if p.static_friction > 0.0:
                 set_vec3(p.drag, axpy(vec(p.drag), across, share))
+    return share
 
 
-# ---- all together or along conjugate ways ----------------------------------------------------------------------------
-
-
-@kernel
-def _solve_exactly(points, terms, mover, span, members, sweeps):
-    """See ``solve``: sweeps go up and down by turns; after every second pair points are solved together."""
-    change = math.inf
-    for pair in range(sweeps.most):
-        for upwards in (True, False):
-            change = _sweep(points, terms, mover, span, upwards)
-        if change <= sweeps.small or pair + 1 == sweeps.most:
-            break
-        if pair % 2 == 1:
-            _together(points, mover, span, members, sweeps.small)
-    return change
+# ---- sweeps along conjugate ways ----------------------------------------------------------------------------
 
 
 @kernel
-def _visit_stirred(p, t, mover, sweep, small):
-    """Visit a contact point; returns by how much a velocity there changed. By more than ``small``, it stirs the two."""
+def _visit_stirred(p, t, mover, number, sweeps):
+    """Visit a contact point; returns by how much a velocity there changed. By what counts, it stirs the two."""
     a, b = mover[p.a], mover[p.b]
     change = _visit(p, a, b)
-    if t.rolling_friction > 0.0:
+    if sweeps.rolls and t.rolling_friction > 0.0:
         _resist_rolling(p, t, a, b)
-    if change > small:
-        a.stirred = sweep
+    if change > sweeps.small:
+        a.stirred = number
         if b.row >= 0:
-            b.stirred = sweep
+            b.stirred = number
     return change
 
 
 @kernel
-def _sweep_all(points, terms, mover, span, ways, sweep, small):
+def _sweep_all(points, terms, mover, span, ways, sweep, sweeps):
     """Visit all points of a span, and list those that push; returns (largest change of a velocity, how many do)."""
     number, count = sweep
     change = 0.0
     for k in range(span[0], span[1]):
         p = points[k]
-        change = max(change, _visit_stirred(p, terms[k], mover, number, small))
+        change = max(change, _visit_stirred(p, terms[k], mover, number, sweeps))
         if p.push > 0.0 and not ways.listed[k - span[0]]:
             count = list_point(ways, span, k, count)
     return change, count
 
 
 @kernel
-def _sweep_listed(points, terms, mover, ways, sweep, small, every):
-    """Visit every listed point, or those of bodies that this sweep or the last has stirred.
-
-    Returns the largest change of a velocity.
-    """
+def _sweep_listed(points, terms, mover, ways, sweep, sweeps, every):
+    """Visit every listed point, or those of bodies that this sweep or the last has stirred; the largest change."""
     number, count = sweep
     change = 0.0
     for n in range(count):
@@ -347,18 +322,19 @@ def _sweep_listed(points, terms, mover, ways, sweep, small, every):
         p = points[k]
         b = mover[p.b]
         if every or mover[p.a].stirred >= number - 1 or (b.row >= 0 and b.stirred >= number - 1):
-            change = max(change, _visit_stirred(p, terms[k], mover, number, small))
+            change = max(change, _visit_stirred(p, terms[k], mover, number, sweeps))
     return change
 
 
 @kernel
-def _solve_nearly(points, terms, mover, span, members, sweeps, ways):
-    """See ``solve``: each sweep goes on along the way of those before, as long as they get shorter.
+def _solve_by_sweeps(points, terms, mover, span, members, sweeps, ways):
+    """Sweep over points; each sweep goes on along the way of those before, as long as they get shorter.
 
-    Where they visit points ``partly``, those that do not push, and those of bodies that others have left as they are,
-    have their turn now and then. All whose impulses went on have it at once: what has left its cone comes back.
+    Where they visit points ``partly``, those that do not push, or of bodies that others leave as they are, have their
+    turn now and then. All whose impulses went on have it at once: what has left its cone comes back. Returns the last
+    change of a velocity.
     """
-    change, last, count = math.inf, 0.0, 0
+    change, last, count, rolls = math.inf, 0.0, 0, sweeps.rolls
     for k in range(span[0], span[1]):
         ways.listed[k - span[0]] = False
         if points[k].push > 0.0:
@@ -367,16 +343,16 @@ def _solve_nearly(points, terms, mover, span, members, sweeps, ways):
         mover[i].stirred = -1
     whole, went_on = True, False
     for sweep in range(2 * sweeps.most):
-        set_out(points, terms, mover, span, members, ways, count)
+        set_out(points, terms, mover, span, members, ways, (count, rolls))
         if whole:
-            change, count = _sweep_all(points, terms, mover, span, ways, (sweep, count), sweeps.small)
+            change, count = _sweep_all(points, terms, mover, span, ways, (sweep, count), sweeps)
         else:
-            change = _sweep_listed(points, terms, mover, ways, (sweep, count), sweeps.small, went_on)
+            change = _sweep_listed(points, terms, mover, ways, (sweep, count), sweeps, went_on)
         if (whole and change <= sweeps.small) or sweep + 1 == 2 * sweeps.most:
             break
-        length2 = length2_of(points, terms, span, ways, count)
+        length2 = length2_of(points, terms, span, ways, (count, rolls))
         share = length2 / last if length2 < last else 0.0
-        go_on(points, terms, mover, span, members, ways, (share, count))
+        go_on(points, terms, mover, span, members, ways, (share, count, rolls))
         last, went_on = length2, share > 0.0
         whole = not sweeps.partly or change <= sweeps.small or (sweep + 1) % SWEEPS_OF_ALL == 0
     return change
@@ -386,8 +362,18 @@ def _solve_nearly(points, terms, mover, span, members, sweeps, ways):
 def solve(points, terms, mover, span, members, sweeps, ways):
     """Change impulses and movers until every contact point of a span (first, last) is within its cone.
 
-    ``ways`` are room. Returns the last change of a velocity [m/s].
+    Where points are also solved together, that is after some pairs of sweeps, and the later where it gets nowhere, as
+    points that slide or leave each other stand in the way. ``ways`` are room. Returns the last change of a velocity
+    [m/s].
     """
-    if sweeps.together:
-        return _solve_exactly(points, terms, mover, span, members, sweeps)
-    return _solve_nearly(points, terms, mover, span, members, sweeps, ways)
+    if not sweeps.together:
+        return _solve_by_sweeps(points, terms, mover, span, members, sweeps, ways)
+    left = sweeps.most
+    while True:
+        few = Sweeps(min(ways.pause[0], left), sweeps.small, False, False, sweeps.rolls)
+        change = _solve_by_sweeps(points, terms, mover, span, members, few, ways)
+        left -= few.most
+        if change <= sweeps.small or left == 0:
+            return change
+        share = _together(points, mover, span, members, sweeps.small)
+        ways.pause[0] = PAIRS_BETWEEN if share >= FAR_ENOUGH else 2 * ways.pause[0]

@@ -12,10 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.core.jit import kernel
+from particlesim.dynamics.settings import PAIRS_BETWEEN
 
 
 class Ways(NamedTuple):
-    """Impulses and velocities at the start of a sweep, and the ways that they have taken; which points are listed."""
+    """Impulses and velocities at the start of a sweep, and the ways that they have taken; which points are listed.
+
+    Where points are solved together instead: when the next time is.
+    """
 
     impulse: np.ndarray  # (m, 7): push, drag and roll
     of_impulse: np.ndarray  # (m, 7)
@@ -23,6 +27,7 @@ class Ways(NamedTuple):
     of_motion: np.ndarray  # (n, 6)
     listed: np.ndarray  # (m,) bool, whether a contact point has pushed
     point: np.ndarray  # (m,) int64, those that have
+    pause: np.ndarray  # (1,) int64, pairs of sweeps until points are solved together
 
 
 @kernel
@@ -35,6 +40,7 @@ def new_ways(points, members):
         np.zeros((members, 6)),
         np.zeros(points, dtype=np.bool_),
         np.zeros(points, dtype=np.int64),
+        np.full(1, PAIRS_BETWEEN, dtype=np.int64),
     )
 
 
@@ -50,14 +56,18 @@ def list_point(ways, span, k, count):
 
 
 @kernel
-def set_out(points, terms, mover, span, members, ways, count):
-    """Keep what a sweep starts from; ``count`` points are listed."""
+def set_out(points, terms, mover, span, members, ways, listed):
+    """Keep what a sweep starts from; ``listed``: how many points are, and whether anything has rolling friction."""
+    count, rolls = listed
     for n in range(count):
         k = ways.point[n]
-        p, t, row = points[k], terms[k], ways.impulse[k - span[0]]
+        p, row = points[k], ways.impulse[k - span[0]]
         row[0] = p.push
         for axis in range(3):
-            row[1 + axis], row[4 + axis] = p.drag[axis], t.roll[axis]
+            row[1 + axis] = p.drag[axis]
+        if rolls:
+            for axis in range(3):
+                row[4 + axis] = terms[k].roll[axis]
     for i in members:
         m = mover[i]
         for axis in range(3):
@@ -65,19 +75,19 @@ def set_out(points, terms, mover, span, members, ways, count):
 
 
 @kernel
-def length2_of(points, terms, span, ways, count):
-    """The square of what a sweep has changed, as twice a kinetic energy [J]."""
-    length2 = 0.0
+def length2_of(points, terms, span, ways, listed):
+    """The square of what a sweep has changed, as twice a kinetic energy [J]; ``listed`` is as in ``set_out``."""
+    length2, (count, rolls) = 0.0, listed
     for n in range(count):
         k = ways.point[n]
-        p, t, row = points[k], terms[k], ways.impulse[k - span[0]]
+        p, row = points[k], ways.impulse[k - span[0]]
         length2 += (p.push - row[0]) ** 2 / p.normal_mass
         if p.static_friction > 0.0:
             for axis in range(3):
                 length2 += (p.drag[axis] - row[1 + axis]) ** 2 / p.tangential_mass
-        if t.rolling_friction > 0.0:
+        if rolls and terms[k].rolling_friction > 0.0:
             for axis in range(3):
-                length2 += (t.roll[axis] - row[4 + axis]) ** 2 / t.rolling_mass
+                length2 += (terms[k].roll[axis] - row[4 + axis]) ** 2 / terms[k].rolling_mass
     return length2
 
 
@@ -85,12 +95,12 @@ def length2_of(points, terms, span, ways, count):
 def go_on(points, terms, mover, span, members, ways, walk):
     """Go a share of the last way once more; the way of these sweeps becomes all that was gone.
 
-    A ``walk`` is (the share, how many points are listed).
+    A ``walk`` is (the share, how many points are listed, whether anything has rolling friction).
     """
-    share, count = walk
+    share, count, rolls = walk
     for n in range(count):
         k = ways.point[n]
-        p, t, row, way = points[k], terms[k], ways.impulse[k - span[0]], ways.of_impulse[k - span[0]]
+        p, row, way = points[k], ways.impulse[k - span[0]], ways.of_impulse[k - span[0]]
         on = share * way[0]
         way[0] = p.push - row[0] + on
         p.push += on
@@ -98,9 +108,12 @@ def go_on(points, terms, mover, span, members, ways, walk):
             on = share * way[1 + axis]
             way[1 + axis] = p.drag[axis] - row[1 + axis] + on
             p.drag[axis] += on
-            on = share * way[4 + axis]
-            way[4 + axis] = t.roll[axis] - row[4 + axis] + on
-            t.roll[axis] += on
+        if rolls:
+            t = terms[k]
+            for axis in range(3):
+                on = share * way[4 + axis]
+                way[4 + axis] = t.roll[axis] - row[4 + axis] + on
+                t.roll[axis] += on
     for i in members:
         m = mover[i]
         for axis in range(3):

@@ -267,16 +267,17 @@ def _pairs_of_sweeps(span):
 def _limits(islands, mover, span, members, part):
     """How many sweeps the points of a span have in a ``part`` of the step [s], and when they end."""
     fastest, pairs = 0.0, _pairs_of_sweeps(span)
-    least = np.inf
+    least, rolls = np.inf, False
     for i in members:
         fastest = max(fastest, norm(vec(mover[i].pull)) * part)
     for k in range(span[0], span[1]):
         fastest = max(fastest, abs(islands.terms[k].approach))
         least = min(least, islands.terms[k].inradius)
+        rolls = rolls or islands.terms[k].rolling_friction > 0.0
     if pairs > FEW_SWEEPS:
-        return Sweeps(min(pairs, MAX_SWEEPS), SWEEP_CONVERGED * fastest, True, False)
+        return Sweeps(min(pairs, MAX_SWEEPS), SWEEP_CONVERGED * fastest, True, False, rolls)
     small = max(SWEEP_CONVERGED * fastest, NEAR_SWEEP_CONVERGED * least / part)
-    return Sweeps(CONJUGATE_SWEEPS, small, False, True)
+    return Sweeps(CONJUGATE_SWEEPS, small, False, True, rolls)
 
 
 @kernel
