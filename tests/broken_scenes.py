@@ -99,7 +99,7 @@ BROKEN = [
     (
         group(shape="{ edges = [1, 2, 3] }"),
         "particles[0].shape: the key 'kind' is missing; "
-        "allowed: 'sphere', 'capsule', 'cylinder', 'cone', 'cube', 'tetrahedron', 'box', 'pyramid' or 'mesh'",
+        "allowed: 'sphere', 'capsule', 'cylinder', 'cone', 'cube', 'tetrahedron', 'box', 'pyramid', 'mesh' or 'compound'",
     ),
     (
         group(shape="3"),

@@ -126,4 +126,7 @@ def _box_about(parts: Sequence[Shape]) -> Polyhedron:
     """The box about parts, in the axes of their compound."""
     lower = np.min([part.vertices.min(axis=0) - part.rounding for part in parts], axis=0)
     upper = np.max([part.vertices.max(axis=0) + part.rounding for part in parts], axis=0)
-    return hull_polygons("compound", np.array(list(product(*zip(lower, upper, strict=True)))))
+    try:
+        return hull_polygons("compound", np.array(list(product(*zip(lower, upper, strict=True)))))
+    except ValueError:
+        raise ValueError("the parts of a compound are too far apart for their sizes") from None

@@ -142,6 +142,12 @@ class Part(Model):
     orientation: Orientation = Field(default=(1.0, 0.0, 0.0, 0.0), description="how it is turned")
 
 
+def _enough(parts: list[Part]) -> list[Part]:
+    if not 1 <= len(parts) <= MAX_PARTS:
+        raise ValueError(f"must be 1 to {MAX_PARTS} parts, not {len(parts)}")
+    return parts
+
+
 class CompoundShape(Model):
     """Several convex shapes as one body, which need not be convex, times the size. Its position is its centroid.
 
@@ -149,8 +155,8 @@ class CompoundShape(Model):
     """
 
     kind: Literal["compound"]
-    parts: Annotated[list[Part], Field(min_length=1, max_length=MAX_PARTS)] = Field(
-        description="where each of them is, in axes of the compound"
+    parts: Annotated[list[Part], AfterValidator(_enough)] = Field(
+        description=f"where each of them is, in axes of the compound; 1 to {MAX_PARTS}"
     )
 
 

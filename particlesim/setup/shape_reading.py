@@ -34,7 +34,7 @@ def surface_of(table: Surfaces, key: str) -> Shape:
 def shape_of(table: Any, key: str) -> Shape:
     """The shape that a scene's table of shapes describes, which stands under ``key``. SceneError if there is none."""
     if isinstance(table, CompoundShape):
-        return compound([_part_of(part, f"{key}.parts[{k}]") for k, part in enumerate(table.parts)])
+        return _compound_of(table, key)
     if isinstance(table, MeshShape) and table.decompose:
         return _decomposed(table, key)
     shape = _made(CATALOGUE[table.kind], table, key, without=("decompose",))
@@ -49,6 +49,15 @@ def _decomposed(table: MeshShape, key: str) -> Shape:
         return _made(decomposed, table, key, without=("decompose", "rounding"))
     except MissingExtraError as error:
         raise SceneError(str(error), f"{key}.decompose", True) from None
+
+
+def _compound_of(table: CompoundShape, key: str) -> Shape:
+    """The compound that a scene's table describes, which stands under ``key``."""
+    parts = [_part_of(part, f"{key}.parts[{k}]") for k, part in enumerate(table.parts)]
+    try:
+        return compound(parts)
+    except ValueError as error:
+        raise _shape_error(key, table, str(error)) from None
 
 
 def _part_of(said: scene_groups.Part, key: str) -> Part:
