@@ -116,7 +116,7 @@ class Scenery:
         )
 
     def bodies_in(self, instances: Instances) -> np.ndarray:
-        """A number (m,) for each of instances that ``amid`` has made: the parts and triangles of a body have the same."""
+        """A number (m,) for each of instances that ``amid`` has made, the same for all parts of a body."""
         number = instances.bodies(np.arange(len(instances.position)))
         others = np.isin(instances.tables.body["shape"], self._obstacle_shapes)
         return np.where(others, -1 - number, number)

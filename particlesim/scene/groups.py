@@ -29,7 +29,7 @@ from particlesim.scene.base import (
     whole,
 )
 from particlesim.scene.colours import COLOUR_WORDS, GroupColour
-from particlesim.scene.messages import listed, must_be, one_of
+from particlesim.scene.messages import must_be, one_of
 from particlesim.scene.placements import AnyOrientation, ListPlacement, Orientation, Placement, RandomPlacement
 from particlesim.scene.surface import Surface
 
