@@ -282,7 +282,7 @@ def test_a_compound_obstacle_that_turns_works_what_bodies_gain():
     ("table", "key"),
     [
         ({"kind": "compound"}, "particles[0].shape: the key 'parts' is missing"),
-        ({"kind": "compound", "parts": []}, "particles[0].shape.parts: must be 1 to 256 parts, not 0"),
+        ({"kind": "compound", "parts": []}, "particles[0].shape.parts = []: must be 1 to 256 parts, not 0"),
         (compound(part("cube", 0, 0, 0), part("cube", 1e25, 0, 0)), "particles[0].shape: the parts of a compound are"),
         (compound(part("cub", 0, 0, 0)), "particles[0].shape.parts[0].shape"),
         (compound(part("cube", 0, 0, 0, size=-1.0)), "particles[0].shape.parts[0].size"),
