@@ -6,6 +6,7 @@ import pytest
 from particlesim.core.parallel import use_threads
 from particlesim.geometry import shapes
 from particlesim.rendering import Renderer
+from particlesim.rendering.camera import Camera
 from particlesim.rendering.look import look_of
 from particlesim.rendering.passes import mean_of, passes_of
 from particlesim.rendering.quality import PRESETS
@@ -160,3 +161,23 @@ def test_the_mean_of_pictures_is_that_of_their_numbers():
     pictures = random.integers(0, 256, (5, 3, 4, 4)).astype(np.uint8)
     assert np.abs(mean_of(iter(pictures)) - pictures.mean(axis=0)).max() <= 0.5
     assert mean_of(iter(pictures[:1])) is not None and np.array_equal(mean_of(iter(pictures[:1])), pictures[0])
+
+
+def test_through_all_of_a_lens_what_is_in_focus_stays_and_the_rest_moves_aside():
+    kind = {"kind": "look-at", "position": (10.0, 0.0, 0.0), "aperture": 0.4, "focus": 8.0}
+    scene = Scene(world={"size": (6.0, 6.0, 6.0)}, particles=[{"shape": "sphere", "count": 1}], camera=kind)
+    camera = Camera(scene, 1.0)
+    view = camera.view(0.0)
+
+    def seen(point, place):
+        """Where a point is seen at distance 1 [m]."""
+        one = camera.through_lens(view, place)
+        x, y, z = one.pose[:3, :3].T @ (np.array(point) - one.pose[:3, 3])
+        return np.array([x, y]) / -z + one.skew
+
+    for place in ((1.0, 0.0), (0.0, -1.0), (0.3, 0.7)):
+        sharp, far = (2.0, 0.5, -0.4), (-6.0, 0.5, -0.4)
+        assert seen(sharp, place) == pytest.approx(seen(sharp, (0.0, 0.0)), abs=1e-12)
+        # A circle of confusion: the lens's radius times (1 / focus - 1 / distance).
+        moved = 0.2 * (1.0 / 8.0 - 1.0 / 16.0) * np.array(place)
+        assert seen(far, place) - seen(far, (0.0, 0.0)) == pytest.approx(moved, abs=1e-12)

@@ -36,6 +36,7 @@ class View(NamedTuple):
     pose: np.ndarray
     field_of_view: float  # [rad], vertical
     near: float  # [m], distance of the nearest plane that is drawn; there is no farthest
+    skew: tuple[float, float] = (0.0, 0.0)  # how much farther right and up all is seen, at distance 1
 
 
 class Box(NamedTuple):
@@ -149,6 +150,17 @@ class Camera:
             pose = _pose(axes, self._target + axes @ self._stand)
         field = float(np.radians(camera.field_of_view))
         return View(pose, field, _near(pose[:3, 3], self._scene, self._box))
+
+    def through_lens(self, view: View, place: tuple[float, float]) -> View:
+        """What is seen through a place on the lens, whose radius is 1 there: what is in focus stays where it is."""
+        lens = self._scene.camera
+        if lens.aperture == 0.0:
+            return view
+        focus = lens.focus or max(float((view.pose[:3, 3] - self._box.middle) @ view.pose[:3, 2]), view.near)
+        aside = 0.5 * lens.aperture * np.asarray(place)
+        pose = view.pose.copy()
+        pose[:3, 3] += pose[:3, :2] @ aside
+        return view._replace(pose=pose, skew=tuple((aside / focus).tolist()))
 
     def _points(self, camera: FixedCamera | OrbitCamera) -> np.ndarray:
         """All places that it is to show, about its target and in its own axes, (n, 3)."""

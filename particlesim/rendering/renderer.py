@@ -116,7 +116,8 @@ class Renderer:
         self._put_lines(view, frame)
 
         def drawn(one: Pass) -> np.ndarray:
-            projection = self._projection(view, one)
+            seen = self._camera.through_lens(view, one.lens)
+            projection = self._projection(seen, one)
             buffer = rasterise(projection, instances, clusters)
             seen = seen_instances(buffer, len(instances.position))
             paint = self._paint(view, frame, (particles, instances), whole, seen)
@@ -134,7 +135,7 @@ class Renderer:
             depth = np.maximum(buffer.inverse_depth, 0.0)
             depth *= np.float32(-view.near)
             depth += np.float32(1.0)
-            return self._canvas.draw(self._bridge.Picture(self._view_block(view, projection), colours, depth))
+            return self._canvas.draw(self._bridge.Picture(self._view_block(seen, projection), colours, depth))
 
         # OpenGL's first row is the lowest, and it has a fourth channel.
         picture = mean_of(map(drawn, passes_of(self._quality.passes)))
@@ -169,7 +170,9 @@ class Renderer:
     def _projection(self, view: View, one: Pass) -> Projection:
         slope = float(np.tan(0.5 * view.field_of_view))
         axes = view.pose[:3, :3].T * np.array([[1.0], [1.0], [-1.0]])
-        return Projection(axes, view.pose[:3, 3], False, 0.5 * self._drawn_size[1] / slope, self._drawn_size, one.shift)
+        scale = 0.5 * self._drawn_size[1] / slope
+        shift = one.shift[0] + scale * view.skew[0], one.shift[1] + scale * view.skew[1]
+        return Projection(axes, view.pose[:3, 3], False, scale, self._drawn_size, shift)
 
     def _behind_panes(
         self,

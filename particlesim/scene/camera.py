@@ -34,7 +34,18 @@ FieldOfView = Annotated[PlainFloat, Field(ge=2, le=149), must_be("an angle from 
 Subject = Annotated[Literal["auto", "world", "particles"], one_of("auto", "world", "particles")]
 
 
-class _Aimed(Model):
+class _Lens(Model):
+    """A camera whose lens may have a size: what is nearer or farther than its focus blurs, at quality best."""
+
+    aperture: NotNegative = Field(
+        default=0.0, description="width of the lens, at quality best; all is sharp if it is 0 [m]"
+    )
+    focus: Positive | None = Field(
+        default=None, description="distance at which all is sharp; that of the middle of its subject if not given [m]"
+    )
+
+
+class _Aimed(_Lens):
     """A camera in a given direction, as near as shows all of its subject, unless its distance is given."""
 
     azimuth: Finite = Field(default=30.0, description="direction that it stands in, about z from +x [degrees]")
@@ -73,7 +84,7 @@ class _Placed(Model):
         return self
 
 
-class LookAtCamera(_Placed):
+class LookAtCamera(_Placed, _Lens):
     """Stands at ``position`` and looks at ``target`` [m]."""
 
     kind: Literal["look-at"]
@@ -105,7 +116,7 @@ class CameraKey(_Placed):
     )
 
 
-class PathCamera(Model):
+class PathCamera(_Lens):
     """Moves smoothly from key to key, at rest before the first and after the last."""
 
     kind: Literal["path"]
