@@ -51,14 +51,8 @@ def round_form(which, centre, strip, world):
     orientation, tables = world[1], world[2]
     if kind == BALL:
         return centre, _NOWHERE, 1.0 / tables.radius[i], _NOWHERE
-    placed = tables.body[i].shape, tables.body[i].size, centre, view_rotation(strip.axes, orientation, i)
-    return _rounded_form(placed, p, tables.shapes)
-
-
-@kernel
-def _rounded_form(placed, p, shapes):
-    number, size, centre, m = placed
-    shape = shapes.shape[number]
+    size, shapes, m = tables.body[i].size, tables.shapes, view_rotation(strip.axes, orientation, i)
+    shape = shapes.shape[tables.body[i].shape]
     faces, edges = shape.last_face - shape.first_face, shape.last_edge - shape.first_edge
     if p < faces:
         return centre, _NOWHERE, 0.0, rotated(m, shapes.face[shape.first_face + p].normal)

@@ -132,9 +132,10 @@ def _shade_rows(rows, strip, buffer, world, lighting, ground, light, pixels):
         find_floor(y, strip, ground, buffer.inverse_depth[number], row)
         if light is None:
             light_row(seen_span(row.close), y, lighting, row)
+            out = pixels[number], None
         else:
             row.lit[:] = light.lit[number]
-        out = pixels[number], _sky_row(light, number)
+            out = pixels[number], light.sky[number]
         first = 0
         while first < width:
             last, kind = run_from(buffer, number, first, row.close, world[2])
@@ -147,14 +148,6 @@ def _shade_rows(rows, strip, buffer, world, lighting, ground, light, pixels):
             else:
                 shade_nothing(span, ground, pixels[number])
             first = last
-
-
-@kernel
-def _sky_row(light, number):
-    """The share of the light from everywhere that reaches each pixel of a row, None where that is not known."""
-    if light is None:
-        return None
-    return light.sky[number]
 
 
 @kernel
