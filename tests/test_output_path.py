@@ -85,7 +85,7 @@ TRILLION = "particles[0].count = 1000000000000: must be a whole number from 0 to
         (
             "duration = 100\n" + GROUP % ('"sphere"', 10**8),
             ["-o", "z.mp4"],
-            "a.toml: particles: 100,000,000 particles need about 100 GB of memory; there are 1 GB",
+            "a.toml: particles: 100,000,000 particles need about 140 GB of memory; there are 1 GB",
         ),
         (
             "duration = 1e5\n[movie]\nresolution = [4000, 4000]\n" + GROUP % ('"sphere"', 1),
