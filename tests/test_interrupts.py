@@ -1,5 +1,6 @@
 """Signals that ask to end arrive as one exception, whatever is running."""
 
+import gc
 import os
 import signal
 import subprocess
@@ -78,11 +79,13 @@ print(add(1, 2))
 @pytest.fixture
 def signals():
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    hook = sys.unraisablehook
     for number in before:
         signal.signal(number, signal.SIG_DFL)
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
+    sys.unraisablehook = hook
 
 
 def test_an_interruption_amid_kernels_is_one():
@@ -105,6 +108,34 @@ def test_signals_that_follow_at_once_do_not_disturb_the_cleaning_up(signals):
     os.kill(os.getpid(), signal.SIGTERM)
     os.kill(os.getpid(), signal.SIGINT)
     assert caught.value.number == signal.SIGHUP
+
+
+class Dying:
+    """Gets a signal as it dies, where exceptions are not raised."""
+
+    def __init__(self):
+        self.itself = self
+
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        raise ValueError("of what is half made")
+
+
+@pytest.mark.parametrize("die", [lambda one: setattr(one, "itself", None), lambda one: None], ids=["counted", "collected"])
+def test_an_interruption_where_exceptions_are_forgotten_is_none_the_less_one(signals, die, capfd):
+    def work():
+        one = Dying()
+        die(one)
+        del one
+        gc.collect()
+        return "lost"
+
+    raise_signals()
+    with pytest.raises(Interrupted) as caught:
+        assert work() is None
+    assert caught.value.number == signal.SIGTERM
+    Dying().itself = None
+    assert capfd.readouterr().err == ""
 
 
 def test_what_is_ignored_stays_so(signals):

@@ -26,11 +26,12 @@ class Interrupted(KeyboardInterrupt):
 
 def raise_signals() -> None:
     """From now on the signals that end a program raise Interrupted, but for those that are ignored (nohup)."""
-    raised = -_GRACE
+    raised: float | None = None
+    usual_hook = sys.unraisablehook
 
     def handle(number: int, frame: FrameType | None) -> None:
         nonlocal raised
-        if time.monotonic() - raised < _GRACE:
+        if raised is not None and time.monotonic() - raised < _GRACE:
             return
         raised = time.monotonic()
         caller = _waiting_for_results(frame)
@@ -38,9 +39,18 @@ def raise_signals() -> None:
             raise Interrupted(number)
         _raise_in(caller, number)
 
+    def hook(lost: Any) -> None:
+        # What Python cannot raise, such as in a __del__, it tells and forgets: the program would go on. What is left
+        # half made by an interruption may fail as it is taken apart, which is nobody's concern any more.
+        if isinstance(lost.exc_value, Interrupted):
+            _raise_in(sys._getframe(1), lost.exc_value.number)
+        elif raised is None:
+            usual_hook(lost)
+
     for number in _SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, handle)
+    sys.unraisablehook = hook
 
 
 def _waiting_for_results(frame: FrameType | None) -> FrameType | None:
