@@ -49,7 +49,7 @@ class TestGate:
         expected = find_pairs(lower, lower + 0.02, method)
         for threads in (1, 2, 3, np.int64(2)):
             np.testing.assert_array_equal(find_pairs(lower, lower + 0.02, method, threads=threads), expected)
-        self.bad("find_pairs: the number of threads must be at least 1, not 0", method=method, threads=0)
+        self.bad("find_pairs: the number of threads must be 1 to 4,096, not 0", method=method, threads=0)
 
     def test_unknown_and_odd_parameters(self):
         for method, known in (("naive", "threads"), ("grid", "cells"), ("octree", "max_count, max_depth")):

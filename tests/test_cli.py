@@ -308,7 +308,8 @@ def test_a_terminal_gets_a_bar(folder):
         (["check"], "Missing argument 'SCENE'; see particlesim check --help"),
         (["check", "x", "--foo"], "No such option: --foo; see particlesim check --help"),
         (["--foo"], "No such option: --foo; see particlesim --help"),
-        (["simulate", "x", "--threads", "0"], "Invalid value for '--threads': must be 1 or more; see particlesim"),
+        (["simulate", "x", "--threads", "0"], "Invalid value for '--threads': must be 1 to 4,096; see particlesim"),
+        (["simulate", "x", "--threads", f"{2**62}"], "Invalid value for '--threads': must be 1 to 4,096; see part"),
     ],
 )
 def test_a_wrong_command_line_gets_one_line(arguments, line):

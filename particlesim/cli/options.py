@@ -7,10 +7,18 @@ from typing import Annotated
 
 import typer
 
+from particlesim.core.constants import MOST_THREADS
+
 
 def _at_least_one(count: int | None) -> int | None:
     if count is not None and count < 1:
         raise typer.BadParameter("must be 1 or more")
+    return count
+
+
+def _threads(count: int | None) -> int | None:
+    if count is not None and not 1 <= count <= MOST_THREADS:
+        raise typer.BadParameter(f"must be 1 to {MOST_THREADS:,}")
     return count
 
 
@@ -29,7 +37,7 @@ Every = Annotated[
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Threads = Annotated[
-    int | None, typer.Option("--threads", callback=_at_least_one, help="Threads to simulate with.  [default: all]")
+    int | None, typer.Option("--threads", callback=_threads, help="Threads to simulate with.  [default: all]")
 ]
 WorkerCount = Annotated[
     int | None,

@@ -43,6 +43,9 @@ SEGMENT = 60
 MESH_ENDINGS = (".stl", ".obj", ".ply")
 LARGEST_MESH = 100_000_000
 
+# Threads at the most that one may ask for: more than any machine has processors.
+MOST_THREADS = 4096
+
 # Endings of movies, .png of one as numbered pictures; the first is what is written if none is named.
 MOVIE_ENDINGS = (".mp4", ".webm", ".gif", ".png")
 

@@ -20,6 +20,9 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TypeVar
 
+from particlesim.core.arguments import shown
+from particlesim.core.constants import MOST_THREADS
+
 Result = TypeVar("Result")
 
 # Fewer items than this are done by the calling thread: to wake threads and wait for them takes about 0.05 ms.
@@ -31,14 +34,14 @@ _limit: ContextVar[int | None] = ContextVar("threads", default=None)
 
 
 def check_threads(count: int | None) -> int | None:
-    """``count`` itself. ValueError if it is below 1."""
-    if count is not None and count < 1:
-        raise ValueError(f"the number of threads must be at least 1, not {count}")
+    """``count`` itself. ValueError if it is below 1 or above ``MOST_THREADS``."""
+    if count is not None and not 1 <= count <= MOST_THREADS:
+        raise ValueError(f"the number of threads must be 1 to {MOST_THREADS:,}, not {shown(count)}")
     return count
 
 
 def use_threads(count: int | None) -> None:
-    """Let all teams of this process have ``count`` threads, or one a processor. ValueError if it is below 1."""
+    """Let all teams of this process have ``count`` threads, or one a processor. ValueError as for check_threads."""
     global _process_limit  # noqa: PLW0603  (a setting of the process, as the number of its processors is)
     _process_limit = check_threads(count)
 
@@ -53,12 +56,12 @@ def limit_threads(count: int | None) -> Iterator[None]:
     Parameters
     ----------
     count : int or None
-        Threads of a team, at least 1.
+        Threads of a team, 1 to ``MOST_THREADS``.
 
     Raises
     ------
     ValueError
-        If ``count`` is below 1.
+        For another ``count``.
     """
     token = _limit.set(check_threads(count) or _limit.get())
     try:
@@ -117,7 +120,7 @@ class ThreadTeam:
     Raises
     ------
     ValueError
-        If ``threads`` is below 1.
+        If there cannot be so many ``threads``.
     """
 
     def __init__(self, count: int, threads: int | None = None) -> None:
