@@ -45,6 +45,20 @@ def test_each_kind_of_file_says_what_it_is_of(files, scene, name, frames):
     assert found["scene"][:20] in CliRunner().invoke(cli.app, ["info", str(files / name)]).output
 
 
+def test_a_table_says_it_in_words(files):
+    for name, words in (("run.gsd", "0 to 10 "), ("movie.mp4", "2 to 8, one in 3"), ("still.png", " 5 ")):
+        assert words in CliRunner().invoke(cli.app, ["info", str(files / name)]).output
+
+
+def test_where_particles_come_and_go_no_drift_is_told(tmp_path):
+    region = {"lower": [-0.5, -0.5, 0.5], "upper": [0.5, 0.5, 0.9]}
+    emitter = {"shape": "sphere", "size": 0.2, "rate": 20.0, "count": 3, "region": region, "velocity": [0, 0, -1]}
+    summary = ps.simulate(ps.Scene(world={"size": [2, 2, 2]}, emitters=[emitter], duration=0.5), tmp_path / "run.gsd")
+    assert summary.flow[0] == 3 and "energy change" not in repr(summary)
+    assert read_provenance(tmp_path / "run.gsd")["energy_drift"] is None
+    assert "particles come and go" in CliRunner().invoke(cli.app, ["info", str(tmp_path / "run.gsd")]).output
+
+
 def test_a_frame_is_what_its_scene_gives(files, scene):
     for more in ([], ["--frame", "4"]):
         shown = CliRunner().invoke(cli.app, ["info", "--verify", str(files / "run.gsd"), "--json", "-q", *more])

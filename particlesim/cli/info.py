@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -38,9 +38,20 @@ def info(
     if as_json:
         print(json.dumps(values, indent=2))
     elif not quiet:
-        print_table(str(file), list(values.items()))
+        print_table(str(file), list((values | _in_words(values)).items()))
     if verify and not values["same"]:
         fail(f"{file}: frame {values['compared']} is not what its scene gives", 1)
+
+
+def _in_words(values: dict[str, Any]) -> dict[str, str]:
+    """What is not told as it is."""
+    first, end, step = values["frames"]
+    frames = range(first, end, step)
+    each = f", one in {step:,}" if step > 1 else ""
+    words = {"frames": f"{frames[0]:,} to {frames[-1]:,}{each}" if len(frames) > 1 else f"{frames[0]:,}"}
+    if values.get("energy_drift", 0.0) is None:
+        words["energy_drift"] = "not told: particles come and go"
+    return words
 
 
 def _verified(file: Path, frame: int | None, quiet: bool, threads: int | None) -> dict[str, object]:

@@ -141,7 +141,7 @@ def _ledger_rows(summary: Summary) -> list[tuple[str, Any]]:
     """What is known of energy, momentum and impacts."""
     rows: list[tuple[str, Any]] = [
         ("impacts", f"{summary.impacts:,}"),
-        ("worst energy change", f"{summary.worst_energy_drift:.1e} of all of it"),
+        *([("worst energy change", f"{summary.worst_energy_drift:.1e} of all of it")] if summary.is_closed else []),
         *((f"lost by {cause}", f"{share:.3g} of all of it") for cause, share in summary.dissipated.items() if share),
     ]
     came, went, waited = summary.flow

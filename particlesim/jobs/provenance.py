@@ -43,9 +43,12 @@ def provenance(header: Header, summary: Summary, frames: range) -> dict[str, Any
     Returns
     -------
     ``version`` of particlesim, ``scene`` (SHA-256 of the scene as JSON), ``title``, ``seed``, ``energy_drift`` (the
-    largest, as a fraction of all energy), ``frames`` (first, end, step).
+    largest, as a fraction of all energy; None where particles come and go, and with them what it would be a fraction
+    of), ``frames`` (first, end, step).
     """
-    drift = {"energy_drift": summary.worst_energy_drift}
+    scene = json.loads(header.scene_json)
+    comes_and_goes = scene.get("emitters") or scene.get("sinks")
+    drift = {"energy_drift": None if comes_and_goes else summary.worst_energy_drift}
     return {**_of_scene(header), **drift, "frames": [frames.start, frames.stop, frames.step]}
 
 

@@ -36,7 +36,9 @@ class Summary:
         self.path: Path | None = None  # of what came of it, once that is whole
 
     def __repr__(self) -> str:
-        known = f", {self.impacts:,} impacts, worst energy change {self.worst_energy_drift:.1e}" if self._last else ""
+        known = f", {self.impacts:,} impacts" if self._last else ""
+        if self._last and self.is_closed:
+            known += f", worst energy change {self.worst_energy_drift:.1e}"
         first, last = self.times
         of = f" of {self.path}" if self.path else ""
         return f"<Summary{of}: {self.frames:,} frames, {self.drawn:,} drawn, {first:g} to {last:g} s{known}>"
@@ -130,6 +132,11 @@ class Summary:
         """Particles that came and went up to the last frame, and the most that ever waited for room."""
         last = self._last
         return (last.released or 0, last.removed or 0, self._most_waiting) if last else (0, 0, 0)
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether nothing came and nothing went: else a change of the energy is no fraction of what there was."""
+        return not any(self.flow[:2])
 
     @property
     def work(self) -> float:
