@@ -60,7 +60,7 @@ class PartialRun:
         self._task = json.loads(json.dumps({"version": importlib.metadata.version("particlesim"), **task}))
         self.folder = partial_folder(self._path).absolute()
         self.kept: dict[str, Any] | None = None  # what was kept last, with "done" and "total" frames
-        self._next = time.monotonic() + INTERVAL
+        self._next: float | None = None  # when something is to be kept
 
     def __enter__(self) -> PartialRun:
         lock = _locked(self.folder)
@@ -104,8 +104,14 @@ class PartialRun:
         return self.folder / self.kept["state"] if self.kept and self.kept["state"] else None
 
     def due(self) -> bool:
-        """Whether it is time to keep what is done."""
-        return time.monotonic() >= self._next
+        """Whether it is time to keep what is done: at first an interval after this is asked for the first time.
+
+        What comes before, such as compiling, may take long, but there is nothing to keep.
+        """
+        now = time.monotonic()
+        if self._next is None:
+            self._next = now + INTERVAL
+        return now >= self._next
 
     def keep(self, done: int, total: int, simulation: Simulation | None, values: dict[str, Any]) -> None:
         """Keep what is done from now on: frames, the files in the folder, the state of a simulation, plain values.
