@@ -116,8 +116,8 @@ class Renderer:
         self._put_lines(view, frame)
 
         def drawn(one: Pass) -> np.ndarray:
-            seen = self._camera.through_lens(view, one.lens)
-            projection = self._projection(seen, one)
+            through = self._camera.through_lens(view, one.lens)
+            projection = self._projection(through, one)
             buffer = rasterise(projection, instances, clusters)
             seen = seen_instances(buffer, len(instances.position))
             paint = self._paint(view, frame, (particles, instances), whole, seen)
@@ -135,7 +135,7 @@ class Renderer:
             depth = np.maximum(buffer.inverse_depth, 0.0)
             depth *= np.float32(-view.near)
             depth += np.float32(1.0)
-            return self._canvas.draw(self._bridge.Picture(self._view_block(seen, projection), colours, depth))
+            return self._canvas.draw(self._bridge.Picture(self._view_block(through, projection), colours, depth))
 
         # OpenGL's first row is the lowest, and it has a fourth channel.
         picture = mean_of(map(drawn, passes_of(self._quality.passes)))
