@@ -1,4 +1,4 @@
-"""What many spheres do together: what a silo's floor bears and lets through, how steep a heap is, what shaking sorts."""
+"""What many spheres do together: what a silo bears and lets through, how steep a heap is, what shaking sorts."""
 
 import numpy as np
 import pytest
@@ -119,14 +119,14 @@ def test_heaps_are_the_steeper_the_more_friction_and_rolling_friction_there_is()
     assert (np.diff(angles, axis=0)[0, 1:] > 1.0).all()  # with little friction all of them slide away
 
 
-# ---- flow through a slot ----------------------------------------------------------------------------------------------
+# ---- flow through a slot --------------------------------------------------------------------------------------------
 
 # The mean diameter [m] of the spheres that flow, how many of it the silo is wide and deep, and when its gate falls [s].
 BEAD, ACROSS, DEEP, OPENED = 0.01, 20, 4, 0.4
 
 
 def slotted_silo(slot, count):
-    """Spheres between smooth walls above a slot of so many diameters, which a gate closes at first; what falls is gone."""
+    """Spheres between smooth walls above a slot of so many diameters, which a gate closes at first."""
     height, thickness = 0.6, 2.0 * BEAD
     floor = -0.5 * height + 0.1
     beads = {
@@ -191,7 +191,7 @@ def test_the_flow_through_a_slot_follows_beverloos_law():
     assert slope**1.5 / of_slots == pytest.approx(1.03, rel=0.25)  # found: 0.87
 
 
-# ---- shaking ----------------------------------------------------------------------------------------------------------
+# ---- shaking --------------------------------------------------------------------------------------------------------
 
 
 def test_a_brazil_nut_rises():

@@ -121,7 +121,9 @@ class Dying:
         raise ValueError("of what is half made")
 
 
-@pytest.mark.parametrize("die", [lambda one: setattr(one, "itself", None), lambda one: None], ids=["counted", "collected"])
+@pytest.mark.parametrize(
+    "die", [lambda one: setattr(one, "itself", None), lambda one: None], ids=["counted", "collected"]
+)
 def test_an_interruption_where_exceptions_are_forgotten_is_none_the_less_one(signals, die, capfd):
     def work():
         one = Dying()
