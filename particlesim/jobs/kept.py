@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from particlesim.rendering.camera import foresees_flight
+from particlesim.rendering.shading.fields import field_colours
 from particlesim.scene import Scene
 from particlesim.scene.groups import SphereShape
 from particlesim.trajectory.gsd_chunks import TrajectoryError
@@ -23,15 +24,15 @@ def check_kept(source: Scene | Trajectory, uses: Uses) -> None:
 
 def uses_of_pictures(scene: Scene) -> Uses:
     """What pictures need that look like this."""
-    colours = {group.colour for group in scene.groups}
+    shown = {colour.field for colour in field_colours(scene) if colour is not None}
     uses = uses_of_shapes(scene)
     if foresees_flight(scene):
         uses["velocity"] = "a camera that follows where particles will fly"
     if "speed" in scene.show.rows:
         uses["velocity"] = "the readout of the speed"
-    if "by_speed" in colours:
+    if "speed" in shown:
         uses["velocity"] = "colour by_speed"
-    if "by_impacts" in colours:
+    if "impacts" in shown:
         uses["impacts"] = "colour by_impacts"
     return uses
 
