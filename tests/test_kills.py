@@ -27,8 +27,7 @@ plot = "energy"
 shape = "cube"
 count = 25
 size = 0.4
-colour = "by_speed"
-colour_range = [0, 30]
+colour = { field = "speed", range = [0, 30] }
 velocity = { kind = "maxwell", temperature = 10 }
 """
 
