@@ -12,7 +12,7 @@ import imageio_ffmpeg
 
 from particlesim.trajectory.gsd_file import Trajectory
 
-# A run that keeps what it has four times a second. It says how often it began each part of its work, and the hash of
+# A run that keeps what it has twenty times a second. It says how often it began each part of its work, and the hash of
 # its last state. Told to, it kills itself so many seconds after it began a part for the nth time: alone, or with ffmpeg
 # as one does who kills a whole group or pulls the plug. Before that it says which parts it was in the midst of.
 RUN = """
@@ -25,7 +25,7 @@ from particlesim.scene.file import load_scene
 from particlesim.simulation.simulation import Simulation
 from particlesim.trajectory.gsd_file import TrajectoryWriter
 
-partial_run.INTERVAL, partial_run._SPARE = 0.25, 1.0
+partial_run.INTERVAL, partial_run._SPARE = 0.05, 1.0
 scene, path, aim = sys.argv[1], sys.argv[2], json.loads(sys.argv[3])
 begun, under_way, last = collections.Counter(), collections.Counter(), None
 
