@@ -22,7 +22,7 @@ from particlesim.cli.output import place_for
 from particlesim.cli.plot import plot
 from particlesim.cli.render import render
 from particlesim.cli.run import load, make_file
-from particlesim.cli.streams import one_line_output, open_streams
+from particlesim.cli.streams import one_line_output, open_streams, warn_in_one_line
 from particlesim.cli.sweep import sweep
 from particlesim.cli.tables import print_report, print_table
 from particlesim.cli.view import view
@@ -87,6 +87,7 @@ def main() -> None:
     130 for Ctrl-C, 143 and 129 for SIGTERM and SIGHUP.
     """
     open_streams()
+    warn_in_one_line()
     raise_signals()
     with one_line_output():
         app()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
@@ -21,6 +22,11 @@ def open_streams() -> None:
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # it gets the lowest number that is free, which is this one
             setattr(sys, name, os.fdopen(number, mode, closefd=False))
+
+
+def warn_in_one_line() -> None:
+    """Let warnings be a line each, without where in the program they are from."""
+    warnings.formatwarning = lambda message, *_, **__: f"{message}\n"
 
 
 @contextmanager

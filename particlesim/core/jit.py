@@ -14,6 +14,7 @@ import os
 import re
 import stat
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,6 +30,7 @@ from numba.np.arrayobj import make_array
 
 from particlesim.core.compile_lock import compiled_here
 from particlesim.core.inner_kernels import take_short_cuts
+from particlesim.core.kernel_cache import KernelCache
 from particlesim.core.ready_made import copy_ready_made, use_ready_made
 
 _PACKAGE = Path(__file__).parent.parent
@@ -66,8 +68,10 @@ def _cache_folder() -> str:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
-    except (OSError, RuntimeError):  # RuntimeError: a user without an entry in passwd, and HOME is not set
-        return str(_private_folder(Path(tempfile.gettempdir()) / f"particlesim-{os.getuid()}"))
+    except (OSError, RuntimeError) as error:  # RuntimeError: a user without an entry in passwd, and HOME is not set
+        elsewhere = _private_folder(Path(tempfile.gettempdir()) / f"particlesim-{os.getuid()}")
+        warnings.warn(f"compiled kernels are kept in {elsewhere}: {error}", stacklevel=2)
+        return str(elsewhere)
     return str(folder)
 
 
@@ -113,7 +117,9 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
         source = function.__code__.co_filename
         copy_ready_made(digest, Path(config.CACHE_DIR, _CacheLocator.get_suitable_cache_subpath(source)))
     try:
-        compiled = _njit(cache=ours, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
+        compiled = _njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
+        if ours and not config.DISABLE_JIT:
+            compiled._cache = KernelCache(function)
     finally:
         config.CACHE_DIR = elsewhere
     if not config.DISABLE_JIT:
