@@ -1,5 +1,6 @@
 """Runs in the formats of other programs, read back by libraries that are not ours."""
 
+import resource
 import sys
 import xml.etree.ElementTree as ET
 
@@ -17,6 +18,7 @@ from particlesim.cli import main as cli
 from particlesim.core.rotations import rotations_of
 from particlesim.geometry.shapes import CATALOGUE
 from particlesim.geometry.surface import surface_of
+from particlesim.jobs import figures
 from particlesim.simulation.simulation import Simulation
 from particlesim.trajectory.export import Exported, ExportError
 from particlesim.trajectory.export.gltf import MAX_PARTICLES, write_glb
@@ -216,6 +218,19 @@ class TestCommand:
         done = self.run(run[0] / "run.gsd", "-o", tmp_path / "x.usda")
         assert done.stderr == "usd-core is not installed; pip install 'particlesim[usd]' does it\n"
         assert done.exit_code == 1 and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["x.pvd", "x.glb", "x.xyz", "x.html", "x.svg"])
+def test_what_does_not_fit_is_told_of_the_output_and_leaves_nothing(run, tmp_path, name):
+    make = {".html": ps.view, ".svg": figures.plot}.get(name[1:], ps.export)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
+    try:
+        with pytest.raises(OSError, match="File too large") as error:
+            make(run[0] / "run.gsd", tmp_path / name)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert error.value.filename == str(tmp_path / name) and not list(tmp_path.iterdir())
 
 
 def test_some_frames_only(run, tmp_path):

@@ -85,4 +85,5 @@ def _check_disk(path: Path, needed: float) -> None:
 
 def _size(count: float) -> str:
     """So many bytes, in words."""
-    return f"{count / 1e9:,.1f} GB" if count >= 1e9 else f"{count / 1e6:,.1f} MB"
+    unit, size = next((each for each in (("GB", 1e9), ("MB", 1e6)) if count >= each[1]), ("kB", 1e3))
+    return f"{count / size:,.1f} {unit}"

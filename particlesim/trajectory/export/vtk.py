@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from particlesim.core.atomic_write import named
 from particlesim.core.output_path import OutputError
 from particlesim.geometry.surface import surface_of
 from particlesim.trajectory.export import Exported
@@ -25,6 +26,14 @@ _VERTEX, _TRIANGLE = 1, 5  # kinds of cells
 
 def write_pvd(path: Path, run: Exported) -> list[Path]:
     """Write a series; what names its files comes last, when all are there. OSError if it cannot be written."""
+    try:
+        return _write(path, run)
+    except OSError as error:
+        named(error, path)
+        raise
+
+
+def _write(path: Path, run: Exported) -> list[Path]:
     folder, entries = path.with_suffix(""), []
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem[:40]}.") as hidden:
         made = Path(hidden) / folder.name
