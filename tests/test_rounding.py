@@ -173,7 +173,13 @@ def written(path, kinds):
     n = len(kinds)
     numbers = np.arange(n)
     header = Header(
-        '{"world": {"size": [9, 9, 9], "boundary": ["wall", "wall", "wall"]}}', kinds, numbers, 1.0 + numbers, numbers, np.ones(n), np.ones((n, 3))
+        '{"world": {"size": [9, 9, 9], "boundary": ["wall", "wall", "wall"]}}',
+        kinds,
+        numbers,
+        1.0 + numbers,
+        numbers,
+        np.ones(n),
+        np.ones((n, 3)),
     )
     still = np.zeros((n, 3))
     upright = np.tile((1.0, 0.0, 0.0, 0.0), (n, 1))
