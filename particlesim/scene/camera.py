@@ -23,7 +23,7 @@ from particlesim.scene.base import (
     shorthand,
     whole,
 )
-from particlesim.scene.messages import hint, listed, must_be, one_of
+from particlesim.scene.messages import check_words, listed, must_be, one_of
 
 Elevation = Annotated[PlainFloat, Field(ge=-89, le=89), must_be("an angle from -89 to 89 degrees")]
 FieldOfView = Annotated[PlainFloat, Field(ge=2, le=149), must_be("an angle from 2 to 149 degrees")]
@@ -231,13 +231,7 @@ def _readout(value: Any) -> Any:
     if isinstance(value, bool):
         return value
     what = f"must be true, false or a list of {listed(_ROWS)}"
-    if not isinstance(value, list | tuple):
-        raise ValueError(what)
-    for word in value:
-        if word not in _ROWS:
-            raise ValueError(what + (hint(word, _ROWS) if isinstance(word, str) else ""))
-        if value.count(word) > 1:
-            raise ValueError(f"must have each row once, but has '{word}' {value.count(word)} times")
+    check_words(value, _ROWS, what, "row")
     return list(value)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +48,17 @@ def hint(word: str, allowed: Iterable[str]) -> str:
     """The allowed word that looks like ``word`` as a question, or nothing."""
     close = difflib.get_close_matches(word.lower(), list(allowed), n=1)
     return f"; did you mean '{close[0]}'?" if close else ""
+
+
+def check_words(value: Any, allowed: Sequence[str], what: str, each: str) -> None:
+    """ValueError, which says ``what`` there must be, if a value is no list of allowed words, ``each`` of them once."""
+    if not isinstance(value, list | tuple):
+        raise ValueError(what)
+    for word in value:
+        if word not in allowed:
+            raise ValueError(what + (hint(word, allowed) if isinstance(word, str) else ""))
+        if value.count(word) > 1:
+            raise ValueError(f"must have each {each} once, but has '{word}' {value.count(word)} times")
 
 
 def listed(words: Iterable[str]) -> str:

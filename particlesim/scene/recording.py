@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BeforeValidator, Field
 
 from particlesim.scene.base import Model, whole
-from particlesim.scene.messages import hint, listed, must_be, one_of
+from particlesim.scene.messages import check_words, listed, must_be, one_of
 
 _Word = Literal["position", "orientation", "velocity", "angular_momentum", "image", "impacts"]
 
@@ -18,13 +18,7 @@ QUANTITIES: tuple[str, ...] = get_args(_Word)
 def _fields(value: Any) -> list[str]:
     """Words without doubles, the position among them. ValueError that names a word that is none."""
     what = f"must be a list of {listed(QUANTITIES)}, 'position' among them"
-    if not isinstance(value, list | tuple):
-        raise ValueError(what)
-    for word in value:
-        if word not in QUANTITIES:
-            raise ValueError(what + (hint(word, QUANTITIES) if isinstance(word, str) else ""))
-        if value.count(word) > 1:
-            raise ValueError(f"must have each word once, but has '{word}' {value.count(word)} times")
+    check_words(value, QUANTITIES, what, "word")
     if QUANTITIES[0] not in value:
         raise ValueError(what)
     return [name for name in QUANTITIES if name in value]
