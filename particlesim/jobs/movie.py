@@ -179,17 +179,17 @@ def render(
     if is_shared:
         check_shared(source, path, shard)
     with opened(source) as movable, PartialRun(path, task_of(movable, look, frames, shard), resume) as run:
-        check_kept(movable, uses_of_pictures(look or _scene_of(movable)))
+        scene = look or _scene_of(movable)
+        check_kept(movable, uses_of_pictures(scene))
         part = None if shard is None else part_of(movable, frames, shard)
         platform.choose()
         platform.describe_ffmpeg()  # which fails now, if it does, and not when all is simulated
-        _compile(movable, look, progress)
-        check_transparency(path, (look or _scene_of(movable)).movie)
+        _compile(movable, scene, progress)
+        check_transparency(path, scene.movie)
         if is_shared and isinstance(movable, Trajectory):
             by = workers, scheduler, threads
-            return render_shared(movable, path, look or movable.scene, frames, run, by, progress)
+            return render_shared(movable, path, scene, frames, run, by, progress)
         chosen = frame_source(movable, frames, threads, progress, run, part)
-        scene = look or chosen.scene
         check_movie(scene, path, len(chosen.wanted), chosen.trajectory is None)
         check_sequence(path, len(chosen.wanted))
         with (
@@ -256,11 +256,11 @@ def still(
     if not math.isfinite(time):
         raise ValueError(f"time must be a finite number of seconds, not {time!r}")
     with opened(source) as movable:
-        check_kept(movable, uses_of_pictures(look or _scene_of(movable)))
+        scene = look or _scene_of(movable)
+        check_kept(movable, uses_of_pictures(scene))
         platform.choose()
-        _compile(movable, look, progress)
+        _compile(movable, scene, progress)
         chosen = frame_source_until(time, movable, threads, progress)
-        scene = look or chosen.scene
         # What a curve would show passes without being drawn, or is not read.
         bare = scene.model_copy(update={"show": scene.show.model_copy(update={"plot": None})})
         with Pictures(chosen, bare, progress) as pictures:
@@ -271,9 +271,9 @@ def still(
     return pictures.summary
 
 
-def _compile(source: Scene | Trajectory, look: Scene | None, progress: Progress | None) -> None:
-    """Compile what pictures of a source need, its own or with the ``look`` of another scene."""
-    compile_kernels(source if isinstance(source, Scene) else None, (look or _scene_of(source)).movie, progress)
+def _compile(source: Scene | Trajectory, look: Scene, progress: Progress | None) -> None:
+    """Compile what pictures of a source need that look like this."""
+    compile_kernels(source if isinstance(source, Scene) else None, look.movie, progress)
 
 
 def _scene_of(source: Scene | Trajectory) -> Scene:
