@@ -17,7 +17,7 @@ from particlesim.core.math3d import load_vec3
 from particlesim.core.parallel import ThreadTeam
 from particlesim.rendering.shading.light import NONE, ONE, single
 from particlesim.rendering.shading.lighting import Light, Lighting
-from particlesim.rendering.shading.pixel_row import PixelRow, row_buffers
+from particlesim.rendering.shading.pixel_row import new_row
 from particlesim.rendering.shading.runs import round_form, run_from, seen_span
 from particlesim.rendering.shading.shade_floor import Ground, find_floor
 from particlesim.rendering.shading.shadow import ShadowMap, light_row, shadow_map
@@ -112,12 +112,8 @@ def _fill_rows(rows, strip, buffer, world, ground, maps, light):
     strip, buffer, world = without_refcounts(strip), without_refcounts(buffer), without_refcounts(world)
     ground, maps, light = without_refcounts(ground), without_refcounts(maps), without_refcounts(light)
     width = light.lit.shape[1]
-    aside = np.empty(width, dtype=np.float32)
-    close, lit, share, across, along, value, texel = row_buffers(width)
     normal, weight = np.empty((3, width), dtype=np.float32), np.empty(width, dtype=np.float32)
-    for x in range(width):
-        aside[x] = np.float32((x + 0.5 - strip.middle_x) / strip.scale)
-    row = PixelRow(aside, close, lit, share, across, along, value, texel)
+    row = new_row(strip, width)
     for number in range(rows[0], rows[1]):
         y = (number + 0.5 - strip.middle_y) / strip.scale
         find_floor(y, strip, ground, buffer.inverse_depth[number], row)

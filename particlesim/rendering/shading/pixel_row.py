@@ -49,15 +49,18 @@ class PixelRow(NamedTuple):
 
 
 @kernel
-def row_buffers(width):
-    """Room for rows: ``close``, ``lit``, ``share``, ``across``, ``along``, ``value`` and ``texel``.
+def new_row(strip, width):
+    """A row of a picture, with the rays of its pixels.
 
     Each is an array of its own: of rows of one array the compiler cannot tell that they do not overlap.
     """
-    close, lit = np.empty(width, dtype=np.float32), np.empty(width, dtype=np.float32)
-    share, across = np.empty(width, dtype=np.float32), np.empty(width, dtype=np.float32)
-    along, value = np.empty(width, dtype=np.float32), np.empty(width, dtype=np.float32)
-    return close, lit, share, across, along, value, np.empty(width, dtype=np.int32)
+    aside, close = np.empty(width, dtype=np.float32), np.empty(width, dtype=np.float32)
+    lit, share = np.empty(width, dtype=np.float32), np.empty(width, dtype=np.float32)
+    across, along = np.empty(width, dtype=np.float32), np.empty(width, dtype=np.float32)
+    value, texel = np.empty(width, dtype=np.float32), np.empty(width, dtype=np.int32)
+    for x in range(width):
+        aside[x] = np.float32((x + 0.5 - strip.middle_x) / strip.scale)
+    return PixelRow(aside, close, lit, share, across, along, value, texel)
 
 
 @kernel

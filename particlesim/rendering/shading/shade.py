@@ -17,7 +17,7 @@ from particlesim.core.parallel import ThreadTeam
 from particlesim.rendering.shading.faces_in_view import faces_in_view
 from particlesim.rendering.shading.lighting import Lighting
 from particlesim.rendering.shading.pixel_light import LightMaps, pixel_light
-from particlesim.rendering.shading.pixel_row import PixelRow, row_buffers
+from particlesim.rendering.shading.pixel_row import new_row
 from particlesim.rendering.shading.runs import round_form, run_from, seen_span
 from particlesim.rendering.shading.shade_face import find_rim, shade_face
 from particlesim.rendering.shading.shade_floor import Ground, find_floor, floor_form, shade_floor, shade_nothing
@@ -121,12 +121,8 @@ def _list_instances(ids, number, indices):
 def _shade_rows(rows, strip, buffer, world, lighting, ground, light, pixels):
     strip, buffer, world = without_refcounts(strip), without_refcounts(buffer), without_refcounts(world)
     lighting, ground, pixels = without_refcounts(lighting), without_refcounts(ground), without_refcounts(pixels)
-    width = pixels.shape[1]
-    aside, to_floor = np.empty(width, dtype=np.float32), floor_form(strip, ground)
-    close, lit, share, across, along, value, texel = row_buffers(width)
-    for x in range(width):
-        aside[x] = np.float32((x + 0.5 - strip.middle_x) / strip.scale)
-    row = PixelRow(aside, close, lit, share, across, along, value, texel)
+    width, to_floor = pixels.shape[1], floor_form(strip, ground)
+    row = new_row(strip, width)
     for number in range(rows[0], rows[1]):
         y = (number + 0.5 - strip.middle_y) / strip.scale
         find_floor(y, strip, ground, buffer.inverse_depth[number], row)
