@@ -3,6 +3,7 @@
 import csv
 import itertools
 import json
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet
@@ -170,12 +171,19 @@ def test_the_command_writes_a_table_and_a_figure(folder):
     assert sorted(file.name for file in (folder / "renders").iterdir()) == [
         "sweep.cases", "sweep.csv", "sweep.png", "sweep.svg",
     ]  # fmt: skip
-    assert "6 cases, mean and standard deviation" in (folder / "renders" / "sweep.svg").read_text()
+    drawn = (folder / "renders" / "sweep.svg").read_text()
+    assert "6 cases, mean and standard deviation" in drawn and "dissipated [J]" in drawn
     wrong = invoke(cli.app, [*arguments[:4], "--figure", "x=world.restitutoin", "y=energy"])
     assert wrong.exit_code == 2
     assert wrong.output == "--figure x=world.restitutoin: there is no such column; did you mean 'world.restitution'?\n"
     wrong = invoke(cli.app, [*arguments[:4], "--figure", "energy", "y=energy"])
     assert (wrong.exit_code, wrong.output) == (2, "--figure energy y=energy: must be x=KEY y=COLUMN\n")
+
+
+def test_the_sweep_beside_the_scenes_has_its_cases():
+    cases = load_sweep(Path(__file__).parents[1] / "scenes" / "sweeps" / "cooling.toml")
+    assert len(cases) == 60 and cases[-1].values == {"world.restitution": 1.0, "seed": 10}
+    assert [case.scene.seed for case in cases[:3]] == [1, 2, 3] and cases[0].scene.world.restitution == 0.5
 
 
 AXES = '[sweep]\nscene = "ball.toml"\n[sweep.axes]\n'

@@ -11,7 +11,10 @@ from mkdocs.structure.files import File
 
 _ROOT = Path(__file__).parents[2]
 _PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "CONTRIBUTING.md", "CHANGELOG.md": "CHANGELOG.md"}
-_FILES = "LICENSE", "CITATION.cff", "scenes/*.toml", "renders/*.mp4", "renders/*.png", "renders/*.svg"
+_FILES = (
+    *("LICENSE", "CITATION.cff", "scenes/*.toml", "scenes/sweeps/*.toml"),
+    *("renders/*.mp4", "renders/*.png", "renders/*.svg"),
+)
 _LINK = re.compile(r"(?<=\]\()(?![a-z]+:|#)([^)#\s]+)")
 
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from particlesim.core.figure import AMBER, BLUE, GREEN, GREYS, ORANGE, PURPLE, SKY, new_figure, save_figure
+from particlesim.jobs.sweep.row import COLUMNS
 from particlesim.scene.messages import hint
 from particlesim.scene.sweep import case_text
 
@@ -64,7 +65,7 @@ def draw(found: Sequence[Curve], x: str, y: str, path: Path) -> list[Path]:
         axes.errorbar(
             curve.places, curve.mean, curve.spread, label=curve.label, marker="o", ms=4.0, capsize=3.0, **style
         )
-    axes.set(xlabel=x, ylabel=y)
+    axes.set(xlabel=_with_unit(x), ylabel=_with_unit(y))
     axes.grid(True, color=GREYS[2])
     if len(found) > 1:
         axes.legend(frameon=False, fontsize=8)
@@ -77,6 +78,11 @@ def _curve(label: str, points: dict[Any, list[float]]) -> Curve:
     mean = [float(np.mean(points[place])) for place in places]
     spread = [float(np.std(points[place], ddof=1)) if len(points[place]) > 1 else 0.0 for place in places]
     return Curve(label, places, mean, spread, sum(map(len, points.values())))
+
+
+def _with_unit(column: str) -> str:
+    unit = COLUMNS.get(column)
+    return f"{column} [{unit}]" if unit else column
 
 
 def _sorted(places: list[Any]) -> list[Any]:

@@ -20,27 +20,27 @@ from particlesim.simulation.soundness import SimulationError
 from particlesim.trajectory.analysis.observables import pressure
 from particlesim.trajectory.frames import Ledger
 
-# The columns of a row: what a table says of each case beside its values.
-COLUMNS = (
-    "particles",
-    "simulated",
-    "kinetic_translational",
-    "kinetic_rotational",
-    "potential",
-    "energy",
-    "energy_drift",
-    "impacts",
-    "dissipated",
-    *(f"dissipated_{cause}" for cause in DISSIPATION),
-    "work",
-    "pressure",
-    "largest_overlap",
-    "unresolved",
-    "seconds",
-    "state",
-    "hash",
-    "error",
-)
+# The columns of a row, what a table says of each case beside its values, with their units.
+COLUMNS = {
+    "particles": "",
+    "simulated": "s",
+    "kinetic_translational": "J",
+    "kinetic_rotational": "J",
+    "potential": "J",
+    "energy": "J",
+    "energy_drift": "",
+    "impacts": "",
+    "dissipated": "J",
+    **{f"dissipated_{cause}": "J" for cause in DISSIPATION},
+    "work": "J",
+    "pressure": "Pa",
+    "largest_overlap": "m",
+    "unresolved": "",
+    "seconds": "s",
+    "state": "",
+    "hash": "",
+    "error": "",
+}
 
 
 def case_hash(scene: Scene) -> str:
