@@ -209,6 +209,7 @@ class TestFigures:
         ps.simulate(ps.load_scene("scene.toml"), "run.gsd")
         with ps.open("run.gsd") as run:
             assert run.plot("energy").axes[0].get_title() == "Energy"
+            assert run.plot("energy")._repr_png_().startswith(b"\x89PNG")  # as notebooks ask, with pyplot or without
             assert [run.table(which).dtype.names[0] for which in TABLES] == ["time", "distance", "speed"]
             assert len(run.table()) == len(run)
             with pytest.raises(ValueError, match="which: must be one of time, radial, speeds, not 'colour'"):

@@ -20,10 +20,10 @@ _SUFFIXES = {".svg": {"Date": None}, ".png": {}}
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of this size [inch], apart from any window."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  (slow to import)
+    """An empty figure of this size [inch], apart from any window; notebooks show it."""
+    from particlesim.core.notebook_figure import NotebookFigure  # noqa: PLC0415  (matplotlib is slow to import)
 
-    return Figure(figsize=(width, height), layout="constrained")
+    return NotebookFigure(figsize=(width, height), layout="constrained")
 
 
 def save_figure(figure: Figure, path: Path) -> list[Path]:
