@@ -235,11 +235,31 @@ class TestCommand:
         assert columns.column_names == list(COLUMNS)
         assert columns["energy"].to_pylist() == [float(row["energy"]) for row in a]
 
-    def test_a_movie_has_no_numbers(self, folder):
+    @pytest.mark.parametrize("movie", ["a.mp4", "a.webm", "a.gif"])
+    def test_a_movie_gives_the_numbers_of_its_scene(self, folder, movie):
+        made = ps.load_scene("scene.toml")
+        made.movie.resolution = 64, 64
+        ps.render(made, movie, frames=range(2))
+        (folder / "scene.toml").rename("moved.toml")
+        for source in (movie, "moved.toml"):
+            result = self.run(source, "--csv", f"{source}.csv", "-q")
+            assert result.exit_code == 0, result.output
+        assert (folder / f"{movie}.csv").read_bytes() == (folder / "moved.toml.csv").read_bytes()
+
+    def test_a_movie_without_its_scene_has_no_numbers(self, folder):
         (folder / "a.mp4").touch()
-        what = "a.mp4: holds pictures, not the run that they are of: give its scene (.toml) or trajectory (.gsd)\n"
-        found = self.run("a.mp4")
-        assert (found.exit_code, found.stderr) == (2, what)
+        with gsd.hoomd.open("foreign.gsd", "w") as file:
+            frame = gsd.hoomd.Frame()
+            frame.configuration.box = [8, 8, 8, 0, 0, 0]
+            frame.particles.N = 1
+            file.append(frame)
+        look = ps.load_scene("scene.toml")
+        look.movie.resolution = 64, 64
+        ps.render("foreign.gsd", "b.mp4", look=look)
+        hint = "does not hold its scene: give that (.toml), or a trajectory (.gsd)"
+        for name, what in (("a.mp4", "does not say where it comes from"), ("b.mp4", hint)):
+            found = self.run(name)
+            assert (found.exit_code, found.stderr) == (2, f"{name}: {what}\n")
 
     def test_one_panel_and_its_numbers(self, folder):
         result = self.run("scene.toml", "--what", "radial", "-o", "g.png", "--csv", "g.csv", "-q")

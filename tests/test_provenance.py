@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import particlesim as ps
 from particlesim.cli import main as cli
-from particlesim.jobs.provenance import ProvenanceError, read_provenance
+from particlesim.jobs.provenance import ProvenanceError, read_provenance, scene_of
 from tests.worlds import gas
 
 TITLE = 'Two; kinds = "of" #bodies\\ and ü'
@@ -39,6 +39,7 @@ def test_each_kind_of_file_says_what_it_is_of(files, scene, name, frames):
     found = read_provenance(files / name)
     assert found["scene"] == hashlib.sha256(scene.model_dump_json().encode()).hexdigest()
     assert (found["title"], found["seed"], found["frames"]) == (TITLE, 7, frames)
+    assert found["keys"] == json.loads(scene.model_dump_json())
     assert found["version"] == "0.1.0" and 0.0 <= found["energy_drift"] < 1e-12
     shown = CliRunner().invoke(cli.app, ["info", str(files / name), "--json"])
     assert json.loads(shown.output) == found
@@ -47,7 +48,18 @@ def test_each_kind_of_file_says_what_it_is_of(files, scene, name, frames):
 
 def test_a_table_says_it_in_words(files):
     for name, words in (("run.gsd", "0 to 10 "), ("movie.mp4", "2 to 8, one in 3"), ("still.png", " 5 ")):
-        assert words in CliRunner().invoke(cli.app, ["info", str(files / name)]).output
+        shown = CliRunner().invoke(cli.app, ["info", str(files / name)]).output
+        assert words in shown and "restitution" not in shown  # the keys of the scene are a page
+
+
+def test_a_scene_of_many_keys_does_not_go_along(tmp_path):
+    poses = [{"position": [k / 100, 0, 0]} for k in range(-450, 450)]
+    row = {"shape": "sphere", "size": 0.005, "placement": {"kind": "list", "poses": poses}}
+    many = ps.Scene(world={"size": [10, 1, 1]}, particles=[row], duration=0.1, movie={"resolution": [64, 64]})
+    ps.render(many, tmp_path / "movie.mp4", frames=range(1))
+    assert len(many.model_dump_json()) > 60_000 and "keys" not in read_provenance(tmp_path / "movie.mp4")
+    with pytest.raises(ProvenanceError, match="does not hold its scene"):
+        scene_of(tmp_path / "movie.mp4")
 
 
 def test_where_particles_come_and_go_no_drift_is_told(tmp_path):

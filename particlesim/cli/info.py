@@ -38,7 +38,9 @@ def info(
     if as_json:
         print(json.dumps(values, indent=2))
     elif not quiet:
-        print_table(str(file), list((values | _in_words(values)).items()))
+        told = values | _in_words(values)
+        told.pop("keys", None)  # a page of them, as JSON
+        print_table(str(file), list(told.items()))
     if verify and not values["same"]:
         fail(f"{file}: frame {values['compared']} is not what its scene gives", 1)
 

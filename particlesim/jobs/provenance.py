@@ -17,11 +17,18 @@ from particlesim.jobs.frame_source import Progress, start, tell
 from particlesim.jobs.pictures import summary_of
 from particlesim.jobs.summary import Summary
 from particlesim.rendering.gl.platform import ffmpeg
+from particlesim.scene import Scene
+from particlesim.scene.file import stored_scene
 from particlesim.trajectory.frames import Frame, Header, ledger_table
 from particlesim.trajectory.gsd_file import Trajectory
 
 # The name of the text in PNG files, and of the tag in movies: the one that every player and ffmpeg knows.
 _TEXT, _TAG = "particlesim", "comment"
+
+
+# The keys of a scene go along up to so many letters of JSON: a tag is handed to ffmpeg as one argument, which the
+# system limits to 131,072 bytes (MAX_ARG_STRLEN, execve(2)), and letters that JSON escapes are escaped once more.
+_LONGEST_KEYS = 60_000
 
 
 class ProvenanceError(ValueError):
@@ -44,18 +51,21 @@ def provenance(header: Header, summary: Summary, frames: range) -> dict[str, Any
     -------
     ``version`` of particlesim, ``scene`` (SHA-256 of the scene as JSON), ``title``, ``seed``, ``energy_drift`` (the
     largest, as a fraction of all energy; None where particles come and go, and with them what it would be a fraction
-    of), ``frames`` (first, end, step).
+    of), ``frames`` (first, end, step); ``keys``, those of the scene, unless they are very many, or the run is another
+    program's, which no scene gives.
     """
     scene = json.loads(header.scene_json)
     comes_and_goes = scene.get("emitters") or scene.get("sinks")
     drift = {"energy_drift": None if comes_and_goes else summary.worst_energy_drift}
-    return {**_of_scene(header), **drift, "frames": [frames.start, frames.stop, frames.step]}
+    known = summary.has_ledger and len(header.scene_json) <= _LONGEST_KEYS
+    keys = {"keys": scene} if known else {}
+    return {**_of_scene(header), **drift, "frames": [frames.start, frames.stop, frames.step], **keys}
 
 
 def texts_of_pictures(header: Header, frames: range) -> Callable[[int], dict[str, str]]:
     """What each picture of a sequence is of, by its number, as texts of its file: as a movie of its frame alone.
 
-    But for the drift of energy, which is that of a run.
+    But for the drift of energy, which is that of a run, and the keys of its scene, of which one copy will do.
     """
     of_scene = _of_scene(header)
     return lambda k: as_text({**of_scene, "frames": [frames[k], frames[k] + 1, 1]})
@@ -96,6 +106,17 @@ def read_provenance(path: str | Path) -> dict[str, Any]:
     if not isinstance(values, dict):
         raise ProvenanceError(f"{path}: does not say where it comes from")
     return values
+
+
+def scene_of(path: str | Path) -> Scene:
+    """The scene that a movie or a picture is of.
+
+    ProvenanceError if it does not say; SceneError if this version cannot read it; OSError if the file cannot be read.
+    """
+    values = read_provenance(path)
+    if "keys" not in values:
+        raise ProvenanceError(f"{path}: does not hold its scene: give that (.toml), or a trajectory (.gsd)")
+    return stored_scene(values["keys"])
 
 
 def replayed(trajectory: Trajectory, number: int, threads: int | None, progress: Progress | None) -> tuple[str, str]:
