@@ -9,6 +9,7 @@ import numpy as np
 from particlesim.rendering.camera import Camera, View
 from particlesim.rendering.gl import platform
 from particlesim.rendering.hud.history import History
+from particlesim.rendering.hud.labels import Labels
 from particlesim.rendering.hud.overlay import Overlay
 from particlesim.rendering.look import Look
 from particlesim.rendering.octree_cells import cell_lines, octree_cells
@@ -67,6 +68,7 @@ class Renderer:
         self._environment = environment = Environment(scene)
         self._camera = Camera(scene, self._size[0] / self._size[1], look.subject, look.window)
         self._overlay = Overlay(look, environment.dark)
+        self._labels = Labels(scene, look.header, environment.dark)
         self._scenery = Scenery(scene, look.header)
         tables = self._scenery.tables
         usual = float(np.median(tables.radius)) if len(tables.radius) else 0.0
@@ -141,6 +143,7 @@ class Renderer:
         picture = mean_of(map(drawn, passes_of(self._quality.passes)))
         channels = self._look.scene.movie.channels
         image = fxaa(picture) if self._quality.fxaa else np.ascontiguousarray(picture[::-1, :, :channels])
+        self._labels.draw(image, view, frame)
         self._overlay.draw(image, frame, history or History())
         return image
 

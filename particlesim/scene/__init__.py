@@ -27,6 +27,9 @@ from particlesim.scene.world import Solver, World
 # More frames than this are refused: a movie of months.
 _MOST_FRAMES = 100_000_000
 
+# More labels would hide what they are of.
+_MOST_LABELS = 1000
+
 
 class Scene(Model):
     """A whole scene. ``Scene(...)`` in Python takes what a scene file says, as dicts or as the models above.
@@ -111,6 +114,22 @@ class Scene(Model):
                 raise ValueError(f"{where}: walls and obstacles do not touch each other")
             if before.setdefault(pair, c) != c:
                 raise ValueError(f"{where}: contact[{before[pair]}] is between these two already")
+        return self
+
+    @model_validator(mode="after")
+    def _labels_are_of_particles(self) -> Scene:
+        numbers = {group.name: group.number for group in self.groups if group.name is not None}
+        labels = 0
+        for k, label in enumerate(self.show.labels):
+            if label.group is not None and label.group not in numbers:
+                where = f"show.labels[{k}].group = {shown(label.group)}"
+                raise ValueError(f"{where}: no group has this name{hint(label.group, numbers)}")
+            if label.particle is not None and label.particle >= self.number:
+                where = f"show.labels[{k}].particle = {label.particle}"
+                raise ValueError(f"{where}: there are the particles 0 to {self.number - 1:,}")
+            labels += 1 if label.group is None else numbers[label.group]
+        if labels > _MOST_LABELS:
+            raise ValueError(f"show.labels: are beside {labels:,} particles; there may be up to {_MOST_LABELS:,}")
         return self
 
     @model_validator(mode="after")

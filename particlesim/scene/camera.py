@@ -235,6 +235,29 @@ def _readout(value: Any) -> Any:
     return list(value)
 
 
+# Letters of a label at the most: more hide the picture.
+_LABEL = 60
+_Words = Annotated[str, Field(min_length=1, max_length=_LABEL), must_be(f"1 to {_LABEL} letters in quotes")]
+
+
+class Label(Model):
+    """Text beside a particle, or beside all of a group."""
+
+    particle: Annotated[int, Field(ge=0), whole, must_be("the number of a particle, 0 the first")] | None = Field(
+        default=None, description="its number, 0 the first, in the order of groups"
+    )
+    group: Text | None = Field(default=None, description="the name of a group, all of whose particles get a label")
+    text: _Words | None = Field(
+        default=None, description="what it says; the name of the group or the number of the particle if not given"
+    )
+
+    @model_validator(mode="after")
+    def _either(self) -> Self:
+        if (self.particle is None) == (self.group is None):
+            raise ValueError("give particle or group, one of them")
+        return self
+
+
 class Show(Model):
     """What is drawn besides the particles."""
 
@@ -244,6 +267,7 @@ class Show(Model):
     plot: Annotated[Literal["energy", "momentum", "impacts"], one_of("energy", "momentum", "impacts")] | None = Field(
         default=None, description="curves over the time, which grow with the movie"
     )
+    labels: list[Label] = Field(default_factory=list, description="text beside particles")
     title: Flag = Field(default=True, description="the scene's title over the opening of the movie, where it has one")
     readout: Annotated[bool | list[str], BeforeValidator(_readout, json_schema_input_type=bool | list[_Row])] = Field(
         default=True, description="which rows; true stands for time, particles, impacts and energy change"
