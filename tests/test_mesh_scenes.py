@@ -1,5 +1,9 @@
 """Meshes and heightfields of scene files: what they are, what is wrong with them, and what they look like."""
 
+import re
+import tomllib
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
@@ -8,9 +12,10 @@ from typer.testing import CliRunner
 
 import particlesim as ps
 from particlesim.cli import main as cli
+from particlesim.scene.messages import shown
 from particlesim.setup.build import build
 from particlesim.setup.scene_obstacles import obstacles_of
-from tests.scene_texts import GOOD
+from tests.scene_texts import GOOD, emitter, group, obstacle
 from tests.worlds import listed, scene
 
 OPEN_WORLD = {"size": (8, 8, 8), "boundary": "open"}
@@ -128,12 +133,12 @@ def write_all(folder):
 
 BROKEN = [
     (surface("none.stl"), 'shape.file = "none.stl": no such file'),
+    (surface("x" * 3000), f'shape.file = "{"x" * 56}...: no such file'),
     (surface("folder.stl"), 'shape.file = "folder.stl": is a folder'),
     (surface("empty.stl"), 'shape.file = "empty.stl": is empty'),
     (surface("words.stl"), 'shape.file = "words.stl": truncated, or not a mesh'),
     (surface("line.obj"), 'shape.file = "line.obj": none of its triangles has an area'),
     (surface("nan.obj"), 'shape.file = "nan.obj": holds numbers that are not finite'),
-    (surface("../beside.stl"), 'shape.file = "../beside.stl": is outside the scene\'s folder'),
     (surface("empty.stl", scale=0), "shape.scale = 0: must be a number above 0"),
     (surface("empty.stl", rounding=0.1), "shape.rounding = 0.1: unknown key; allowed: kind, file, unit, scale"),
     (field("none.npy"), 'shape.file = "none.npy": no such file'),
@@ -151,13 +156,48 @@ def test_a_mesh_that_is_none_is_said_to_be_in_one_line(text, line, tmp_path, mon
     folder = tmp_path / "scenes"
     folder.mkdir()
     write_all(folder)
-    trimesh.creation.box().export(tmp_path / "beside.stl")
     (folder / "scene.toml").write_text(text)
     monkeypatch.chdir(folder)
     with pytest.raises(ps.SceneError) as caught:
         ps.Simulation(ps.load_scene("scene.toml"))
     said = str(caught.value).removeprefix("scene.toml: ")
     assert said.startswith(f"obstacles[0].{line}") and "\n" not in said
+
+
+# Everything of a scene that names a file.
+_MESH = '{ kind = "mesh", file = "%s" }'
+_COMPOUND = '{ kind = "compound", parts = [{ shape = ' + _MESH + " }] }"
+NAMES = {
+    "particles[0].shape.file": group(shape=_MESH),
+    "particles[0].shape.file (decompose)": group(shape=_MESH.replace(" }", ", decompose = true }")),
+    "particles[0].shape.parts[0].shape.file": group(shape=_COMPOUND),
+    "emitters[0].shape.file": emitter(shape=_MESH),
+    "obstacles[0].shape.file": obstacle(_MESH),
+    "obstacles[0].shape.file (heightfield)": obstacle('{ kind = "heightfield", file = "%s", size = [1, 1, 1] }'),
+    "obstacles[0].shape.parts[0].shape.file": obstacle(_COMPOUND),
+}
+
+
+@pytest.mark.parametrize(("key", "text"), NAMES.items())
+@pytest.mark.parametrize("way", ["../beside.stl", "../scenes-of-others/beside.stl", "link.stl", "none", "absolute"])
+def test_a_scene_file_names_no_file_outside_its_folder(key, text, way, tmp_path, monkeypatch):
+    """There or not; not even by a link. What Python says may be anywhere."""
+    for folder in ("scenes/more", "scenes-of-others"):
+        (tmp_path / folder).mkdir(parents=True)
+    for file in ("beside.stl", "scenes-of-others/beside.stl", "scenes/more/inside.stl"):
+        trimesh.creation.box().export(tmp_path / file)
+    monkeypatch.chdir(tmp_path / "scenes")
+    Path("link.stl").symlink_to("../beside.stl")
+    way = {"none": "../../none.stl", "absolute": str(tmp_path / "beside.stl")}.get(way, way)
+    Path("scene.toml").write_text(text % way)
+    line = f"scene.toml: {key.split(' ')[0]} = {shown(way)}: is outside the folder of the file that names it"
+    with pytest.raises(ps.SceneError, match=f"^{re.escape(line)}$"):
+        ps.load_scene("scene.toml")
+    for inside in ("more/inside.stl", "../scenes/more/inside.stl", str(tmp_path / "scenes/more/inside.stl")):
+        Path("scene.toml").write_text(text % inside)
+        ps.load_scene("scene.toml")
+    if way != "../../none.stl":
+        ps.Scene(**tomllib.loads(text % way))
 
 
 def test_check_says_what_is_odd_about_a_mesh(tmp_path):

@@ -70,7 +70,7 @@ def test_a_good_path_is_let_through_and_nothing_is_left(tmp_path):
 
 
 GROUP = "[world]\nsize = [4, 4, 4]\n[[particles]]\nshape = %s\ncount = %s\nsize = 0.01\n"
-MESH = '{ kind = "mesh", file = "../m.%s" }'
+MESH = '{ kind = "mesh", file = "meshes/m.%s" }'
 NUMBERED = "pictures of a movie need a place for their number"
 TRILLION = "particles[0].count = 1000000000000: must be a whole number from 0 to 100,000,000"
 
@@ -96,21 +96,21 @@ TRILLION = "particles[0].count = 1000000000000: must be a whole number from 0 to
         (
             GROUP % (MESH % "off", 1),
             [],
-            'a.toml: particles[0].shape.file = "../m.off": must be an STL, OBJ or PLY file',
+            'a.toml: particles[0].shape.file = "meshes/m.off": must be an STL, OBJ or PLY file',
         ),
         (
             GROUP % (MESH % "stl", 1),
             [],
-            'a.toml: particles[0].shape.file = "../m.stl": has 500 MB: a mesh file has 100 MB at most',
+            'a.toml: particles[0].shape.file = "meshes/m.stl": has 500 MB: a mesh file has 100 MB at most',
         ),
     ],
 )
 def test_the_command_refuses_before_it_loads_what_the_work_needs(tmp_path, scene, arguments, line):
     """On a machine with a gigabyte of each."""
-    (tmp_path / "in").mkdir()
+    (tmp_path / "in/meshes").mkdir(parents=True)
     (tmp_path / "in/a.toml").write_text(scene)
-    (tmp_path / "m.off").touch()
-    with (tmp_path / "m.stl").open("wb") as file:
+    (tmp_path / "in/meshes/m.off").touch()
+    with (tmp_path / "in/meshes/m.stl").open("wb") as file:
         file.truncate(500_000_000)
     code = f"""
 import os, shutil, sys
@@ -126,4 +126,4 @@ finally:
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path / "in", check=False)
     assert (done.returncode, done.stdout, done.stderr) == (2, "[]\n", line + "\n")
-    assert sorted(path.name for path in (tmp_path / "in").iterdir()) == ["a.toml"]
+    assert sorted(path.name for path in (tmp_path / "in").iterdir()) == ["a.toml", "meshes"]

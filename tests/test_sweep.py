@@ -248,6 +248,32 @@ def test_what_is_wrong_with_a_table_of_cases_too(folder, text, line):
     assert str(error.value) == line
 
 
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ('scene = "../ball.toml"\ncases = "c.csv"', 'sweep.scene = "../ball.toml"'),
+        ('scene = "ball.toml"\ncases = "../c.csv"', 'sweep.cases = "../c.csv"'),
+        ('scene = "ball.toml"\ncases = "/dev/stdin"', 'sweep.cases = "/dev/stdin"'),
+    ],
+)
+def test_a_sweep_names_no_file_outside_its_folder(folder, monkeypatch, text, line):
+    (folder / "c.csv").write_text("seed\n1")
+    (folder / "in").mkdir()
+    monkeypatch.chdir(folder / "in")
+    (folder / "in/sweep.toml").write_text(f"[sweep]\n{text}\n")
+    with pytest.raises(SceneError) as error:
+        load_sweep("sweep.toml")
+    assert str(error.value) == f"sweep.toml: {line}: is outside the folder of the file that names it"
+
+
+def test_no_case_names_a_file_outside_the_folder_of_its_scene(folder):
+    text = '[sweep]\nscene = "ball.toml"\n[sweep.axes]\n"particles[0].shape" = [{ kind = "mesh", file = "../b.stl" }]\n'
+    (folder / "sweep.toml").write_text(text)
+    line = r'particles\[0\]\.shape\.file = "\.\./b\.stl": is outside the folder of the file that names it$'
+    with pytest.raises(SceneError, match=line):
+        load_sweep("sweep.toml")
+
+
 def test_values_are_put_where_paths_lead():
     scene = {"world": {"size": [1, 2, 3]}, "particles": [{"size": 1}]}
     for path, value in (("world.size[2]", 9), ("particles[0].velocity.kind", "rest"), ("solver.time_step", 0.1)):

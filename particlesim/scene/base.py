@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -64,7 +65,36 @@ PositiveVector = Annotated[
 ]
 Text = Annotated[str, must_be("text in quotes")]
 Flag = Annotated[bool, Field(strict=True), must_be("true or false")]
-File = Annotated[Path, must_be("the path of a file, in quotes")]
+
+# The folder that paths start at; None in a scene that was stored, whose files need not be there any more.
+_folder: ContextVar[Path | None] = ContextVar("folder", default=Path())
+
+# Whether it is that of a file that names them, which may have come from anywhere.
+_of_file: ContextVar[bool] = ContextVar("of_file", default=False)
+
+
+@contextmanager
+def paths_from(folder: Path | None, of_file: bool = False) -> Iterator[None]:
+    """Let paths in tables that are made in the ``with`` block start at a folder; None: as they are, unseen."""
+    tokens = _folder.set(folder), _of_file.set(of_file)
+    try:
+        yield
+    finally:
+        _folder.reset(tokens[0])
+        _of_file.reset(tokens[1])
+
+
+def _from_folder(path: Path) -> Path:
+    """A path that starts at the folder. ValueError if a file names it that is neither in its folder nor below."""
+    folder = _folder.get()
+    if folder is None:
+        return path
+    if _of_file.get() and not Path(os.path.realpath(folder / path)).is_relative_to(os.path.realpath(folder)):
+        raise ValueError("is outside the folder of the file that names it")
+    return folder / path
+
+
+File = Annotated[Path, must_be("the path of a file, in quotes"), AfterValidator(_from_folder)]
 
 
 class Model(BaseModel):
@@ -119,32 +149,12 @@ def in_time(keys: list[Any]) -> list[Any]:
     return keys
 
 
-# The folder that paths in a scene start at; None for a scene that was stored, whose files need not be there any more.
-_folder: ContextVar[Path | None] = ContextVar("folder", default=Path())
-
-# Whether it is that of a scene file, which may have come from anywhere.
-_of_file: ContextVar[bool] = ContextVar("of_file", default=False)
-
-
-@contextmanager
-def paths_from(folder: Path | None, of_file: bool = False) -> Iterator[None]:
-    """Let paths in scenes that are made in the ``with`` block start at a folder; None: as they are, unseen."""
-    tokens = _folder.set(folder), _of_file.set(of_file)
-    try:
-        yield
-    finally:
-        _folder.reset(tokens[0])
-        _of_file.reset(tokens[1])
-
-
 def existing_file(path: Path) -> Path:
-    """The path of a file from the folder of its scene. ValueError if there is no such file."""
-    folder = _folder.get()
-    if folder is None:
-        return path
-    if not (folder / path).is_file():
-        raise ValueError("is a folder" if (folder / path).is_dir() else "no such file")
-    return folder / path
+    """The path of a file. ValueError if there is none."""
+    # Of a name that no file can have Path.is_file raises.
+    if _folder.get() is not None and not os.path.isfile(path):
+        raise ValueError("is a folder" if os.path.isdir(path) else "no such file")
+    return path
 
 
 def mesh_file(path: Path) -> Path:
@@ -153,14 +163,6 @@ def mesh_file(path: Path) -> Path:
     if _folder.get() is not None:
         check_mesh_file(found)
     return found
-
-
-def file_within(path: Path) -> Path:
-    """The path of a file that exists. ValueError if a scene file names it that is neither in its folder nor below."""
-    folder = _folder.get()
-    if folder is not None and _of_file.get() and not path.resolve().is_relative_to(folder.resolve()):
-        raise ValueError("is outside the scene's folder")
-    return path
 
 
 def shorthand(

@@ -108,7 +108,7 @@ class MeshShape(Model):
     """
 
     kind: Literal["mesh"]
-    file: Annotated[File, AfterValidator(mesh_file)] = Field(description="path from the scene's folder")
+    file: Annotated[File, AfterValidator(mesh_file)] = Field(description="path within the scene's folder")
     unit: Unit = Field(default="m", description="of the numbers in the file")
     rounding: Rounding = Field(default=0.0, description=_ROUNDING)
     decompose: Flag = Field(default=False, description="a compound of convex parts, not the hull; needs coacd")

@@ -19,7 +19,6 @@ from particlesim.scene.base import (
     Timed,
     Vector,
     existing_file,
-    file_within,
     in_time,
     mesh_file,
     shorthand,
@@ -45,9 +44,7 @@ class SurfaceShape(Model):
     """
 
     kind: Literal["mesh"]
-    file: Annotated[File, AfterValidator(mesh_file), AfterValidator(file_within)] = Field(
-        description="path within the scene's folder"
-    )
+    file: Annotated[File, AfterValidator(mesh_file)] = Field(description="path within the scene's folder")
     unit: Unit = Field(default="m", description="of the numbers in the file")
     scale: Positive = Field(default=1.0, description="factor on the numbers in the file")
 
@@ -56,9 +53,7 @@ class HeightfieldShape(Model):
     """Heights on a grid, from a numpy array (.npy) or a picture (.png, black is 0 and white is 1), about its middle."""
 
     kind: Literal["heightfield"]
-    file: Annotated[File, AfterValidator(existing_file), AfterValidator(file_within)] = Field(
-        description="path within the scene's folder"
-    )
+    file: Annotated[File, AfterValidator(existing_file)] = Field(description="path within the scene's folder")
     size: PositiveVector = Field(
         description="how far it goes along x (columns) and y (rows, the first at the far end), and the height of 1 [m]"
     )

@@ -14,7 +14,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BeforeValidator, Field, ValidationError, create_model, model_validator
 
 from particlesim.scene import Scene
-from particlesim.scene.base import File, Model, whole
+from particlesim.scene.base import File, Model, paths_from, whole
 from particlesim.scene.errors import SceneError
 from particlesim.scene.file import load_table, parse_scene
 from particlesim.scene.key_paths import put
@@ -97,14 +97,14 @@ def load_sweep(path: str | Path) -> list[Case]:
     path = Path(path)
     table = load_table(path)
     try:
-        sweep = SweepFile(**table).sweep
+        with paths_from(path.parent, of_file=True):
+            sweep = SweepFile(**table).sweep
     except ValidationError as error:
         raise SceneError(*explain(error, table, SweepFile), path) from None
-    base = path.parent / sweep.scene
-    whole_scene = load_table(base)
-    listed = list(_combined(sweep.axes) if sweep.cases is None else _read(path.parent / sweep.cases))
+    whole_scene = load_table(sweep.scene)
+    listed = list(_combined(sweep.axes) if sweep.cases is None else _read(sweep.cases))
     return [
-        Case(values, _scene(whole_scene, base, values, f"case {number} of {len(listed)}", path))
+        Case(values, _scene(whole_scene, sweep.scene, values, f"case {number} of {len(listed)}", path))
         for number, values in enumerate(listed, start=1)
     ]
 
