@@ -11,8 +11,9 @@ from particlesim.core.output_path import check_output
 from particlesim.jobs.compiling import compile_kernels
 from particlesim.jobs.frame_source import Progress, frame_source, opened, told
 from particlesim.jobs.kept import Uses, check_kept, uses_of_shapes
-from particlesim.rendering.shading.colour import fixed_colours
+from particlesim.rendering.shading.colour import fixed_colours, obstacle_colours
 from particlesim.scene import Scene
+from particlesim.trajectory.drawn_obstacles import drawn_obstacles
 from particlesim.trajectory.export import Exported
 from particlesim.trajectory.export.gltf import write_glb
 from particlesim.trajectory.export.usd import usd_modules, write_usd
@@ -75,8 +76,10 @@ def export(
         else:
             check_kept(movable, _uses(movable.scene, suffix))
         chosen = frame_source(movable, frames, threads, progress)
-        colours = fixed_colours(chosen.scene, chosen.header)
-        return _WRITERS[suffix](path, Exported(chosen.scene, chosen.header, told(chosen, progress), colours))
+        scene, header = chosen.scene, chosen.header
+        obstacles = drawn_obstacles(scene, header, obstacle_colours(scene))
+        run = Exported(scene, header, told(chosen, progress), fixed_colours(scene, header), obstacles)
+        return _WRITERS[suffix](path, run)
 
 
 def _uses(scene: Scene, suffix: str) -> Uses:

@@ -10,7 +10,7 @@ from particlesim.core.constants import TRIANGLE
 from particlesim.core.rotations import rotations_of
 from particlesim.geometry.shape_table import middle_of, stack_shapes
 from particlesim.geometry.shapes import Shape
-from particlesim.rendering.shading.colour import parse
+from particlesim.rendering.shading.colour import obstacle_colours
 from particlesim.rendering.visibility.geometry_tables import BODY, GeometryTables, geometry_tables, joined
 from particlesim.rendering.visibility.instances import Instances
 from particlesim.rendering.visibility.rasterise import VisibilityBuffer
@@ -51,7 +51,7 @@ class Scenery:
         self._size = np.array([o.size if o.shape.is_bounded else 1.0 for o in self._obstacles])
         self._parts = [self._parts_of(k, shape, len(header.shapes) + k) for k, shape in enumerate(header.obstacles)]
         self._obstacle_shapes = np.unique(np.concatenate([[-1], *(part.body["shape"] for part in self._parts)]))
-        self._colour = np.array([parse(said.colour) for said in scene.obstacles]).reshape(-1, 3)
+        self._colour = obstacle_colours(scene)
         self._opacity = np.array([said.opacity for said in scene.obstacles])
         self.opaque = np.flatnonzero(self._opacity == 1.0)
         self.clear = np.flatnonzero((self._opacity > 0.0) & (self._opacity < 1.0))

@@ -27,6 +27,11 @@ def parse(colour: str) -> np.ndarray:
     return encoded(colour) ** 2
 
 
+def obstacle_colours(scene: Scene) -> np.ndarray:
+    """Linear RGB (k, 3) float64 of the obstacles of a scene."""
+    return np.array([parse(obstacle.colour) for obstacle in scene.obstacles]).reshape(-1, 3)
+
+
 def palette_colour(number: int) -> np.ndarray:
     """The colour of a group or shape by its number, sRGB 0 .. 1 (3,): 35 of them differ."""
     turn, place = divmod(number % (len(_MIXED_IN) * len(PALETTE)), len(PALETTE))

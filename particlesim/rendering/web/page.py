@@ -17,9 +17,10 @@ from particlesim.geometry.shapes import Shape
 from particlesim.geometry.surface import SPLITS, surface_of
 from particlesim.rendering.camera import subject_box
 from particlesim.rendering.hud.panel import Style
-from particlesim.rendering.shading.colour import ParticleColours
+from particlesim.rendering.shading.colour import ParticleColours, obstacle_colours
 from particlesim.rendering.shading.environment import Environment
 from particlesim.scene import Scene
+from particlesim.trajectory.drawn_obstacles import DrawnObstacle, drawn_obstacles, poses_of
 from particlesim.trajectory.frames import Frame, Header
 
 # Numbers of a page at the most [bytes], before they are compressed: browsers hold several times as much.
@@ -54,13 +55,14 @@ def page(scene: Scene, header: Header, first: Frame, frames: Iterable[Frame], co
     """The page of some frames of a run, whose first frame of all says what the camera frames.
 
     Positions are true to 1/65,535 of the box that all of them are in, velocities to 1/32,767 of the fastest along an
-    axis, orientations to 1/32,767; masses and sizes are in single precision.
+    axis, orientations to 1/32,767; masses, sizes and obstacles are in single precision.
     """
     packed = _Packed(header, colours)
     for frame in frames:
         packed.add(frame)
     arrays, ranges = packed.arrays()
-    content, listed = _bytes_of(arrays)
+    obstacles = drawn_obstacles(scene, header, obstacle_colours(scene))
+    content, listed = _bytes_of({**arrays, **_obstacle_arrays(obstacles, packed.times)})
     around = Environment(scene)
     style = Style(scene.movie.size, around.dark)
     camera = scene.camera
@@ -76,6 +78,7 @@ def page(scene: Scene, header: Header, first: Frame, frames: Iterable[Frame], co
         "subject": [edge.tolist() for edge in subject_box(scene, header, first)],
         "seen": [getattr(camera, "azimuth", 35.0), getattr(camera, "elevation", 18.0)],
         "groups": [group.name or f"group {number + 1}" for number, group in enumerate(scene.groups)],
+        "obstacles": [_described(each) for each in obstacles],
         "shapes": [_surface(shape, SPLITS - (len(header.shape) > _MANY)) for shape in header.shapes],
     }
     template = string.Template((_HERE / "page.html").read_text())
@@ -156,6 +159,24 @@ def _bytes_of(arrays: dict[str, np.ndarray]) -> tuple[bytes, list[dict[str, Any]
         content += values.astype(values.dtype.newbyteorder("<")).tobytes()
         content += bytes(-len(content) % 4)
     return bytes(content), listed
+
+
+def _obstacle_arrays(obstacles: list[DrawnObstacle], times: list[float]) -> dict[str, np.ndarray]:
+    """The surfaces of obstacles, and their poses at these times [s]: position, then x, y, z, w."""
+    arrays: dict[str, np.ndarray] = {}
+    for number, each in enumerate(obstacles):
+        name = f"obstacle_{number}"
+        arrays[f"{name}_position"] = each.surface.vertices.astype(np.float32)
+        arrays[f"{name}_normal"] = each.surface.normals.astype(np.float32)
+        arrays[f"{name}_triangles"] = each.surface.triangles.astype(np.uint32)
+    poses = [poses_of(obstacles, time) for time in times]
+    rows = [np.hstack([position, np.roll(orientation, -1, axis=1)]) for position, orientation in poses]
+    return {**arrays, "obstacle_pose": np.array(rows, dtype=np.float32)}
+
+
+def _described(drawn: DrawnObstacle) -> dict[str, Any]:
+    colour = _hex(255.0 * np.sqrt(drawn.colour))
+    return {"name": drawn.name, "colour": colour, "opacity": drawn.opacity, "two_sided": drawn.has_two_sides}
 
 
 def _surface(shape: Shape, splits: int) -> dict[str, Any]:

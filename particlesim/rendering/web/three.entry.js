@@ -2,7 +2,8 @@
 //   npm install three@0.187.0 esbuild
 //   npx esbuild three.entry.js --bundle --minify --format=iife --global-name=THREE --outfile=three.js
 export {
-  BoxGeometry, BufferAttribute, BufferGeometry, Color, DirectionalLight, EdgesGeometry, HemisphereLight, InstancedMesh,
-  LineBasicMaterial, LineSegments, MeshLambertMaterial, PerspectiveCamera, Raycaster, Scene, Vector2, WebGLRenderer,
+  BoxGeometry, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, EdgesGeometry, FrontSide,
+  HemisphereLight, InstancedMesh, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, PerspectiveCamera, Raycaster,
+  Scene, Vector2, WebGLRenderer,
 } from "three";
 export { OrbitControls } from "three/addons/controls/OrbitControls.js";

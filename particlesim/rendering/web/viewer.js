@@ -16,6 +16,39 @@ async function unpacked(run) {
   return arrays;
 }
 
+// A surface: corners and normals, three numbers each, and the corners of its triangles.
+function surface(positions, normals, triangles) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(positions), 3));
+  geometry.setAttribute("normal", new THREE.BufferAttribute(Float32Array.from(normals), 3));
+  geometry.setIndex(new THREE.BufferAttribute(Uint32Array.from(triangles), 1));
+  return geometry;
+}
+
+// The obstacles, each a mesh by itself.
+class Obstacles {
+  constructor(run, arrays) {
+    this.poses = arrays.obstacle_pose; // of each in each frame: where it is, and the quaternion x, y, z, w
+    this.meshes = run.obstacles.map(({ colour, opacity, two_sided: twoSided }, k) => {
+      const [positions, normals, triangles] = ["position", "normal", "triangles"].map(
+        (name) => arrays[`obstacle_${k}_${name}`]);
+      const clear = opacity < 1;
+      return new THREE.Mesh(surface(positions, normals, triangles), new THREE.MeshLambertMaterial({
+        color: colour, side: twoSided ? THREE.DoubleSide : THREE.FrontSide,
+        opacity, transparent: clear, depthWrite: !clear, // what is behind glass is drawn, whichever comes first
+      }));
+    });
+  }
+
+  show(frame) {
+    this.meshes.forEach((mesh, k) => {
+      const start = 7 * (frame * this.meshes.length + k);
+      mesh.position.fromArray(this.poses, start);
+      mesh.quaternion.fromArray(this.poses, start + 3);
+    });
+  }
+}
+
 // The particles as instanced meshes, one mesh for each shape.
 class Particles {
   constructor(run, arrays) {
@@ -28,11 +61,7 @@ class Particles {
     this.meshes = run.shapes.map((shape, row) => {
       const ids = [];
       arrays.shape.forEach((its, id) => { if (its === row) ids.push(id); });
-      const geometry = new THREE.BufferGeometry();
-      for (const name of ["position", "normal"]) {
-        geometry.setAttribute(name, new THREE.BufferAttribute(new Float32Array(shape[name]), 3));
-      }
-      geometry.setIndex(shape.triangles);
+      const geometry = surface(shape.position, shape.normal, shape.triangles);
       const mesh = new THREE.InstancedMesh(geometry, new THREE.MeshLambertMaterial(), ids.length);
       mesh.setColorAt(0, new THREE.Color());
       mesh.frustumCulled = false;
@@ -116,9 +145,11 @@ class Viewer {
     this.frame = 0;
     this.since = null; // when the present frame was shown while it plays [ms]
     this.particles = new Particles(run, arrays);
+    this.obstacles = new Obstacles(run, arrays);
     this.scene = new THREE.Scene();
     this.scene.background = new THREE.Color(run.background);
-    this.scene.add(...this.particles.meshes, new THREE.HemisphereLight(0xffffff, 0xb0a8a0, 2.0));
+    const meshes = [...this.particles.meshes, ...this.obstacles.meshes];
+    this.scene.add(...meshes, new THREE.HemisphereLight(0xffffff, 0xb0a8a0, 2.0));
     const [low, high] = run.subject;
     const centre = low.map((value, axis) => 0.5 * (value + high[axis]));
     const reach = Math.hypot(...low.map((value, axis) => high[axis] - value));
@@ -177,6 +208,7 @@ class Viewer {
   show(frame) {
     this.frame = Math.min(Math.max(frame, 0), this.run.times.length - 1);
     this.particles.show(this.frame);
+    this.obstacles.show(this.frame);
     document.getElementById("frame").value = this.frame;
     const { times } = this.run;
     document.getElementById("time").textContent =

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from particlesim.scene import Scene
+from particlesim.trajectory.drawn_obstacles import DrawnObstacle
 from particlesim.trajectory.frames import Frame, Header
 
 
@@ -16,9 +17,13 @@ class ExportError(ValueError):
 
 
 class Exported(NamedTuple):
-    """What there is to write of a run: ``frames`` in the order of time, ``colours`` (n, 3) linear RGB 0 .. 1 by id."""
+    """What there is to write of a run.
+
+    ``frames`` are in the order of time; ``colours`` (n, 3) are linear RGB 0 .. 1, by id.
+    """
 
     scene: Scene
     header: Header
     frames: Iterable[Frame]
     colours: np.ndarray
+    obstacles: Sequence[DrawnObstacle] = ()

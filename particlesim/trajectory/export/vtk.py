@@ -2,7 +2,9 @@
 
 The files are VTK XML (https://docs.vtk.org, "VTK XML formats"), with base64 arrays. A frame is points with the data of
 the particles. Glyphs are drawn with ``orientation`` as quaternion (w, x, y, z), scaled by ``size``, of the shape
-whose number is ``shape``: its surface is in shape_NUMBER.vtu.
+whose number is ``shape``: its surface is in shape_NUMBER.vtu. Obstacles are surfaces, where they are, with ``obstacle``
+(the number in the scene), ``colour`` (sRGB) and ``opacity`` of their triangles: those that stand are part 1 of each
+frame and one file, those that move are part 2 and a file for each frame.
 """
 
 from __future__ import annotations
@@ -10,13 +12,15 @@ from __future__ import annotations
 import base64
 import os
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from particlesim.core.atomic_write import named
 from particlesim.core.output_path import OutputError
-from particlesim.geometry.surface import surface_of
+from particlesim.geometry.surface import surface_of, together
+from particlesim.trajectory.drawn_obstacles import DrawnObstacle, placed
 from particlesim.trajectory.export import Exported
 from particlesim.trajectory.frames import Frame, Header
 
@@ -42,10 +46,20 @@ def _write(path: Path, run: Exported) -> list[Path]:
             surface = surface_of(shape)
             text = _grid(surface.vertices, surface.triangles, _TRIANGLE, {"Normals": surface.normals})
             (made / f"shape_{number}.vtu").write_text(text, encoding="ascii")
+        standing, moving = ([each for each in run.obstacles if each.moves == moves] for moves in (False, True))
+        if standing:
+            (made / "standing.vtu").write_text(_surfaces(standing, 0.0), encoding="ascii")
         for number, frame in enumerate(run.frames):
-            name = f"frame_{number:05d}.vtu"
-            (made / name).write_text(_points(run.header.of(frame), frame), encoding="ascii")
-            entries.append(f'<DataSet timestep="{frame.time:.17g}" part="0" file="{folder.name}/{name}"/>')
+            parts = {0: f"frame_{number:05d}.vtu"}
+            (made / parts[0]).write_text(_points(run.header.of(frame), frame), encoding="ascii")
+            if standing:
+                parts[1] = "standing.vtu"
+            if moving:
+                parts[2] = f"moving_{number:05d}.vtu"
+                (made / parts[2]).write_text(_surfaces(moving, frame.time), encoding="ascii")
+            for part, name in parts.items():
+                entry = f'timestep="{frame.time:.17g}" part="{part}" file="{folder.name}/{name}"'
+                entries.append(f"<DataSet {entry}/>")
         index = Path(hidden) / path.name
         index.write_text(_file("Collection", "\n".join(entries)), encoding="utf-8")
         former = Path(hidden) / "former"
@@ -70,6 +84,21 @@ def check_folder(path: Path) -> None:
         raise OutputError(f"{path}: its frames go to a folder {folder}, which is there and is of no {path.name}")
 
 
+def _surfaces(obstacles: Sequence[DrawnObstacle], time: float) -> str:
+    """The surfaces of obstacles where they are at a time [s]."""
+    whole = together(placed(obstacles, time))
+    # The root of the light, as pictures have it.
+    colour = np.rint(255.0 * np.sqrt([each.colour for each in obstacles])).astype(np.uint8)
+    values = {
+        "obstacle": np.array([each.number for each in obstacles]),
+        "colour": colour,
+        "opacity": np.array([each.opacity for each in obstacles]),
+    }
+    count = [len(each.surface.triangles) for each in obstacles]
+    data = {name: np.repeat(of_each, count, axis=0) for name, of_each in values.items()}
+    return _grid(whole.vertices, whole.triangles, _TRIANGLE, {"Normals": whole.normals}, data)
+
+
 def _points(header: Header, frame: Frame) -> str:
     """The particles of a frame, which the header is of."""
     data = {
@@ -80,8 +109,14 @@ def _points(header: Header, frame: Frame) -> str:
     return _grid(frame.position, np.arange(len(frame.position))[:, None], _VERTEX, data)
 
 
-def _grid(points: np.ndarray, cells: np.ndarray, kind: int, data: dict[str, np.ndarray]) -> str:
-    """Points with data, and cells of as many of them each."""
+def _grid(
+    points: np.ndarray,
+    cells: np.ndarray,
+    kind: int,
+    data: dict[str, np.ndarray],
+    cell_data: dict[str, np.ndarray] | None = None,
+) -> str:
+    """Points with data, and cells of as many of them each, which may have data, too."""
     corners = cells.shape[1]
     parts = {
         "Points": [_array("Points", points)],
@@ -91,6 +126,7 @@ def _grid(points: np.ndarray, cells: np.ndarray, kind: int, data: dict[str, np.n
             _array("types", np.full(len(cells), kind, dtype=np.uint8)),
         ],
         "PointData": [_array(name, values) for name, values in data.items()],
+        "CellData": [_array(name, values) for name, values in (cell_data or {}).items()],
     }
     body = "\n".join(f"<{name}>\n{chr(10).join(arrays)}\n</{name}>" for name, arrays in parts.items())
     piece = f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(cells)}">\n{body}\n</Piece>'
