@@ -7,6 +7,7 @@ from PIL import Image
 
 import particlesim as ps
 from particlesim.rendering.regions import region_lines
+from particlesim.trajectory import gsd_file
 from particlesim.trajectory.gsd_file import Trajectory
 from tests.worlds import listed, scene
 
@@ -130,7 +131,9 @@ def test_files_have_as_many_particles_as_there_are(tmp_path):
         for k, (frame, schema) in enumerate(zip(trajectory, file, strict=True)):
             sim.run_until(what.time_of(k))
             b = sim.model.particles
-            assert frame.present.tolist() == b["id"].tolist() == schema.log["particles/id"].tolist()
+            # OVITO takes this for its property of that name, and follows particles by it.
+            ids = schema.log["particles/Particle Identifier"]
+            assert frame.present.tolist() == b["id"].tolist() == ids.tolist() and ids.shape == (schema.particles.N,)
             assert np.allclose(frame.position, b["position"], rtol=1e-6, atol=1e-6)
             assert len(b) == schema.particles.N
             assert np.allclose(schema.particles.mass, b["mass"], rtol=1e-6)
@@ -139,6 +142,18 @@ def test_files_have_as_many_particles_as_there_are(tmp_path):
             assert frame.ledger.released == sim.ledger.released
             numbers.add(len(b))
     assert len(numbers) > 10
+
+
+def test_ids_of_version_0_1_are_read(tmp_path, monkeypatch):
+    """Which had them under another name."""
+    ps.simulate(fountain(), tmp_path / "new.gsd")
+    monkeypatch.setattr(gsd_file, "_IDS", "log/particles/id")
+    ps.simulate(fountain(), tmp_path / "old.gsd")
+    monkeypatch.undo()
+    with gsd.hoomd.open(str(tmp_path / "old.gsd")) as file:
+        assert "particles/id" in file[1].log and "particles/Particle Identifier" not in file[1].log
+    with Trajectory(tmp_path / "new.gsd") as new, Trajectory(tmp_path / "old.gsd") as old:
+        assert [frame.ids.tolist() for frame in old] == [frame.ids.tolist() for frame in new]
 
 
 def test_a_movie_shows_those_that_are_there(tmp_path):

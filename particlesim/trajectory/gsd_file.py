@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
     from particlesim.trajectory.analysis.measurements import Measurements
 
-_ID = "log/particles/id"
+# Ids, by OVITO's name of them: so it follows particles whose number changes. Version 0.1 had them under the other name.
+_IDS, _FORMER_IDS = "log/particles/Particle Identifier", "log/particles/id"
 
 # Under this prefix is what the schema has of particles.
 _SCHEMA = "particles/"
@@ -94,7 +95,7 @@ class TrajectoryWriter:
             particles.moment_inertia = header.inertia[ids].astype(np.float32)
             particles.diameter = display_diameters(header)[ids]
         if frame.present is not None:
-            own[_ID] = ids.astype(np.uint32)
+            own[_IDS] = ids.astype(np.uint32)
         out.log.update(_logged({**own, **ledger_log(frame.ledger)}))
         self._file.append(out)
         self._count += 1
@@ -260,7 +261,8 @@ class Trajectory:
         with reading(self.path):
             if not self._is_own:
                 check_same_particles(self._chunks, self.header, k)
-            present = self._chunks.read(_ID, k).astype(np.int64) if self._chunks.has(_ID) else None
+            names = [name for name in (_IDS, _FORMER_IDS) if self._chunks.has(name)]
+            present = self._chunks.read(names[0], k).astype(np.int64) if names else None
             count = len(self.header.shape) if present is None else len(present)
             if present is not None and ((present >= len(self.header.shape)).any() or (np.diff(present) <= 0).any()):
                 raise ValueError(f"ids of frame {k}")
