@@ -17,6 +17,8 @@ from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_typ
 import numpy as np
 from numpy.typing import ArrayLike
 
+from particlesim.core.text import shortened
+
 _Given = ParamSpec("_Given")
 _Result = TypeVar("_Result")
 
@@ -36,9 +38,6 @@ _WORDS: dict[Any, str] = {
 FARTHEST = 1e30
 
 _LARGEST = int(np.finfo(np.float64).max)
-
-# A longer value is not shown whole.
-_SHOWN = 60
 
 
 def checked_arguments(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
@@ -128,7 +127,7 @@ def shown(value: Any) -> str:
         text = " ".join(repr(value).split())
     except ValueError:  # Python writes no whole number of more than some thousand digits
         text = type(value).__name__
-    return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
+    return shortened(text)
 
 
 def real_numbers(what: str, values: ArrayLike) -> np.ndarray:

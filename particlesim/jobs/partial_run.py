@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 from particlesim.core.atomic_write import atomic_write
 from particlesim.core.output_path import partial_folder
+from particlesim.core.text import shortened
 from particlesim.simulation.simulation import Simulation
 from particlesim.simulation.soundness import SimulationError
 
@@ -233,10 +234,6 @@ def _difference(before: Any, now: Any, key: str = "") -> str | None:
     elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
         below = ((f"{key}[{k}]", *pair) for k, pair in enumerate(zip(before, now, strict=True)))
     else:
-        return None if before == now else f"{key} was {_brief(before)} and is {_brief(now)}"
+        was, is_now = (shortened(json.dumps(value)) for value in (before, now))
+        return None if before == now else f"{key} was {was} and is {is_now}"
     return next((found for name, a, b in below if (found := _difference(a, b, name)) is not None), None)
-
-
-def _brief(value: Any) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -20,6 +20,7 @@ from typing import Any, Protocol, TypeVar
 
 from particlesim.core.extras import require
 from particlesim.core.parallel import available_threads, limit_threads
+from particlesim.core.text import shortened
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
@@ -170,7 +171,7 @@ def _client(distributed: Any, address: Any) -> Any:
         return distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         words = " ".join(str(error).split())
-        raise WorkersError(f"{address}: no scheduler answers there ({words[:100]})") from None
+        raise WorkersError(f"{address}: no scheduler answers there ({shortened(words, 100)})") from None
 
 
 def _check_versions(client: Any, scheduler: str | None) -> None:

@@ -10,8 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError, WrapValidator
 
-# Values and lists of allowed words longer than this are cut short in a message [characters].
-_WIDTH = 60
+from particlesim.core.text import shortened
 
 # Name of the error of a number that is too large or too close to 0 to compute with.
 OUT_OF_REACH = "out_of_reach"
@@ -69,8 +68,7 @@ def listed(words: Iterable[str]) -> str:
 
 def shown(value: Any) -> str:
     """A value as TOML would write it, on one line, cut short where it is long."""
-    text = _toml(value)
-    return text if len(text) <= _WIDTH else f"{text[: _WIDTH - 3]}..."
+    return shortened(_toml(value))
 
 
 def _toml(value: Any) -> str:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from particlesim.core.text import shortened
 from particlesim.geometry.convex_hull import hull_polygons
 from particlesim.geometry.shapes import Shape, principal_hull, sphere
 from particlesim.scene import Scene
@@ -110,11 +111,8 @@ def _drawn(chunks: Chunks, name: str, described: Any) -> _Drawn:
     """How a type is drawn that the file describes like this. TrajectoryError for what describes no shape."""
     kind = described.get("type", "") if isinstance(described, dict) else ""
     if kind not in _SHAPES:
-        return _Drawn(
-            sphere(),
-            None,
-            f"{name}: spheres, as its shape {json.dumps(described)[:40]} cannot be drawn" if described else "",
-        )
+        said = shortened(json.dumps(described), 40)
+        return _Drawn(sphere(), None, f"{name}: spheres, as its shape {said} cannot be drawn" if described else "")
     try:
         return _SHAPES[kind](name, described)
     except KeyError as error:

@@ -13,6 +13,8 @@ from pathlib import Path
 import gsd.fl
 import numpy as np
 
+from particlesim.core.text import shortened
+
 # Layout of GSD files, version 1 and 2 (https://gsd.readthedocs.io, "File layer specification").
 _MAGIC = 0x65DF65DF65DF65DF
 _HEADER = np.dtype(
@@ -57,7 +59,7 @@ def reading(path: Path) -> Iterator[None]:
         raise
     except (OSError, RuntimeError, ValueError, LookupError, TypeError, ArithmeticError, MemoryError) as error:
         words = " ".join(str(error).split()) or type(error).__name__
-        raise TrajectoryError(f"{path}: damaged, or not a trajectory ({words[:100]})") from None
+        raise TrajectoryError(f"{path}: damaged, or not a trajectory ({shortened(words, 100)})") from None
 
 
 class Chunks:

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from particlesim.core.text import shortened
 from particlesim.rendering.errors import RenderError
 from particlesim.rendering.gl.geometry import STRIP
 from particlesim.rendering.gl.platform import Platform, check_process
@@ -57,6 +58,7 @@ from pyrender.shader_program import ShaderProgram  # noqa: E402
 _SHADERS = Path(__file__).with_name("shaders")
 _FLOAT = 4  # bytes
 _LINE = 4, 3, 4  # floats of each attribute of a line
+_REASON = 70  # letters of what a driver says that are told
 _VIEW_BLOCK = 0  # binding point of the uniform block shared by all shaders
 # Formats of what is drawn on, and of the numbers that are put there: in memory they are the same, and copied.
 _COLOUR = gl.GL_RGBA8, gl.GL_RGBA, gl.GL_UNSIGNED_BYTE
@@ -226,7 +228,8 @@ class Canvas:
         try:
             yield
         except (AssertionError, OpenGL.error.Error, OSError, ValueError) as error:
-            reason = " ".join(str(error).split()) or type(error).__name__
+            # What it was called with comes last, and says nothing.
+            reason = shortened(" ".join(str(error).split()), _REASON) or type(error).__name__
             raise RenderError(f"{self._what}: {reason}") from error
 
     def draw(self, picture: Picture) -> np.ndarray:

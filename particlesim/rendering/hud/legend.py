@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from particlesim.core.text import shortened
 from particlesim.rendering.hud.panel import Panel, Style
 from particlesim.rendering.shading.colour import ParticleColours, palette_colour, shape_colours
 from particlesim.rendering.shading.colour_maps import encoded, map_colours
@@ -22,7 +23,7 @@ _SCALE, _BAR, _MARK, _SWATCH = 11.0, 0.7, 0.25, 0.8
 _NAMES, _COLUMNS = 0.6, 2
 
 # Letters of a name that are shown: more would hide the picture.
-_LETTERS = 28
+_LETTERS = 31
 
 
 class Swatch(NamedTuple):
@@ -108,7 +109,7 @@ def _swatch_panel(named: list[Swatch], rows: int, style: Style) -> Panel:
     edge, pad = round(_SWATCH * style.em), style.pad
     gap = round(0.6 * style.em)
     shown = named if len(named) <= _COLUMNS * rows else named[: _COLUMNS * rows - 1]
-    names = [swatch.name if len(swatch.name) <= _LETTERS else swatch.name[:_LETTERS] + "..." for swatch in shown]
+    names = [shortened(swatch.name, _LETTERS) for swatch in shown]
     texts = names if len(shown) == len(named) else [*names, f"and {len(named) - len(shown)} more"]
     rows = -(-len(texts) // -(-len(texts) // rows))  # as many in each column
     columns = [texts[first : first + rows] for first in range(0, len(texts), rows)]
