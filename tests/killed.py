@@ -12,6 +12,25 @@ import imageio_ffmpeg
 
 from particlesim.trajectory.gsd_file import Trajectory
 
+# A scene to be killed in. Its scale is given: one that is settled by the frames is simulated anew by those who go on.
+SCENE = """
+title = "Left"
+duration = 2.5
+[world]
+size = [3, 3, 3]
+[movie]
+resolution = [96, 64]
+[show]
+readout = true
+plot = "energy"
+[[particles]]
+shape = "cube"
+count = 25
+size = 0.4
+colour = { field = "speed", range = [0, 30] }
+velocity = { kind = "maxwell", temperature = 10 }
+"""
+
 # A run that keeps what it has twenty times a second. It says how often it began each part of its work, and the hash of
 # its last state. Told to, it kills itself so many seconds after it began a part for the nth time: alone, or with ffmpeg
 # as one does who kills a whole group or pulls the plug. Before that it says which parts it was in the midst of.

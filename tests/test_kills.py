@@ -13,30 +13,12 @@ from tests import killed
 KILLS = int(os.environ.get("KILLS", "4"))
 SEED = int(os.environ.get("KILLS_SEED", "17"))
 
-SCENE = """
-title = "Left"
-duration = 2.5
-[world]
-size = [3, 3, 3]
-[movie]
-resolution = [96, 64]
-[show]
-readout = true
-plot = "energy"
-[[particles]]
-shape = "cube"
-count = 25
-size = 0.4
-colour = { field = "speed", range = [0, 30] }
-velocity = { kind = "maxwell", temperature = 10 }
-"""
-
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["run.gsd", "movie.mp4"])
 def test_killed_in_any_part_it_ends_as_if_it_had_not_been(tmp_path, name):
     scene, path = tmp_path / "scene.toml", tmp_path / name
-    scene.write_text(SCENE)
+    scene.write_text(killed.SCENE)
     ended, midst = [], collections.Counter()
     for victims, said in killed.kills(scene, path, KILLS, SEED):
         found = said["hash"], killed.content(path), killed.bytes_of(path)
