@@ -5,6 +5,8 @@ from __future__ import annotations
 
 def in_words(seconds: float) -> str:
     """A time as people say it."""
+    if seconds < 1.0:
+        return "less than a second"
     if seconds < 99.5:
         return f"{seconds:.0f} s"
     minutes = round(seconds / 60.0)

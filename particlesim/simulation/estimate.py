@@ -77,7 +77,8 @@ def _computing(simulation: Simulation) -> str:
     slowest = int(np.argmax(walls))
     reached = sum(passed) - passed[slowest]
     seconds = (sum(walls) - walls[slowest]) / reached * duration
-    return f"about {in_words(seconds)} to simulate, as the first {reached:.3g} s of the scene go; pictures come on top"
+    about = "about " if seconds >= 1.0 else ""
+    return f"{about}{in_words(seconds)} to simulate, as the first {reached:.3g} s of the scene go; pictures come on top"
 
 
 def _particle_rows(simulation: Simulation) -> list[tuple[str, str]]:
