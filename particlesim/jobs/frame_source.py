@@ -17,7 +17,7 @@ from particlesim.scene.file import load_scene
 from particlesim.simulation.estimate import check_end
 from particlesim.simulation.simulation import Simulation
 from particlesim.simulation.soundness import check_energy
-from particlesim.trajectory.frames import Frame, Header, Ledger
+from particlesim.trajectory.frames import Frame, Header, Ledger, read_frame, write_frame
 from particlesim.trajectory.gsd_file import Trajectory
 
 # Memory for frames that are simulated before the first is drawn [bytes], and how many are looked at.
@@ -26,6 +26,9 @@ _SPREAD = 33
 
 # Particles of a stored frame that are looked at for it: what few go beyond is told by these.
 _LOOKED_AT = 250_000
+
+# Where a run of a scene keeps its first frame, which scales and changes refer to.
+_FIRST = "first.npz"
 
 # Called with what is going on, how many frames are done, and how many there will be.
 Progress = Callable[[str, int, int], None]
@@ -126,14 +129,16 @@ def frame_source(
             begin=part.start,
         )
     wanted = _among(wanted, source.frames)
-    simulation = start(source, threads, progress)
-    header, first = simulation.header, simulation.frame()
     if run is not None and run.state:
-        del simulation  # there may be no memory for two
-        simulation = Simulation.load(run.state, threads=threads)
+        simulation, first = Simulation.load(run.state, threads=threads), read_frame(run.folder / _FIRST)
+    else:
+        simulation, kept = start(source, threads, progress), 0
+        first = simulation.frame()
+        if run is not None:
+            write_frame(run.folder / _FIRST, first)
     total = max(wanted) + 1
-    frames = frames_of(simulation, first.ledger, total, kept if run is not None and run.state else 0)
-    return FrameSource(source, header, first, frames, total, wanted, "simulating", simulation)
+    frames = frames_of(simulation, first.ledger, total, kept)
+    return FrameSource(source, simulation.header, first, frames, total, wanted, "simulating", simulation)
 
 
 def frame_source_until(

@@ -20,8 +20,9 @@ _LEDGER = 2400
 _SINGLE = {"position": 12, "orientation": 16, "velocity": 12, "angular_momentum": 16, "image": 12, "impacts": 4}
 _DOUBLE = {"position": 24, "orientation": 32, "velocity": 24, "angular_momentum": 24}
 
-# Bytes of a checkpoint for each particle; the one before goes when the next is whole.
-_CHECKPOINT = 2 * 430
+# Bytes of a checkpoint for each particle, where the one before goes when the next is whole; a movie has its first frame
+# beside them.
+_CHECKPOINT, _FIRST = 2 * 430, 144
 
 # Bytes a pixel of a movie at crf 18, of which x264 doubles or halves six more or less: 0.03 to 0.07 in the movies
 # in renders/. The least is what a movie takes in which next to nothing moves.
@@ -57,7 +58,7 @@ def check_movie(scene: Scene, path: Path, pictures: int, simulated: bool) -> Non
     state = 0
     if simulated:
         check_memory(scene.number)
-        state = _CHECKPOINT * scene.number
+        state = (_CHECKPOINT + _FIRST) * scene.number
     movie = scene.movie
     segment = 3 * math.prod(movie.size) * min(pictures, SEGMENT)
     # Segments are there until they are joined.

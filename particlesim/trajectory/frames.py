@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -192,3 +194,17 @@ class Frame:
     def rows(self, ids: np.ndarray) -> np.ndarray:
         """Where in the frame the particles with these ids (k,) are, (k,)."""
         return ids if self.present is None else np.searchsorted(self.present, ids)
+
+
+def write_frame(path: Path, frame: Frame) -> None:
+    """Write a frame with its ledger to a file of numpy's (.npz), to the last bit. OSError if it cannot be written."""
+    assert frame.ledger is not None
+    values = {name: value for name, value in vars(frame).items() if value is not None}
+    np.savez(path, **{**values, "ledger": json.dumps(ledger_table(frame.ledger))})
+
+
+def read_frame(path: Path) -> Frame:
+    """What was written by ``write_frame``. OSError if it cannot be read."""
+    with np.load(path, allow_pickle=False) as stored:
+        values = {name: stored[name] for name in stored.files}
+    return Frame(**{**values, "time": values["time"].item(), "ledger": ledger_of(json.loads(values["ledger"].item()))})
