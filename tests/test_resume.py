@@ -21,23 +21,6 @@ from particlesim.rendering.video import segments
 from tests import killed
 from tests.worlds import gas
 
-SCENE = """
-title = "Left"
-duration = 2.5
-[world]
-size = [3, 3, 3]
-[movie]
-resolution = [96, 64]
-[show]
-readout = true
-[[particles]]
-shape = "cube"
-count = 25
-size = 0.4
-colour = "by_speed"
-velocity = { kind = "maxwell", temperature = 10 }
-"""
-
 
 @pytest.fixture
 def always(monkeypatch):
@@ -115,6 +98,15 @@ def test_another_scene_is_refused_by_the_key_that_differs(tmp_path, always, chan
     with pytest.raises(PartialRunError, match=key):
         ps.simulate(some(**change), tmp_path / "run.gsd", resume=True)
     ps.simulate(some(), tmp_path / "run.gsd", resume=True)
+
+
+def test_who_goes_on_builds_nothing_again(tmp_path, always, monkeypatch):
+    ps.render(some(), tmp_path / "straight.mp4")
+    with pytest.raises(KeyboardInterrupt):
+        ps.render(some(), tmp_path / "a.mp4", progress=stopped(30))
+    monkeypatch.delattr("particlesim.jobs.frame_source.start")
+    ps.render(some(), tmp_path / "a.mp4", resume=True)
+    assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "straight.mp4").read_bytes()
 
 
 def test_what_ended_before_anything_was_kept_leaves_nothing(tmp_path):
@@ -205,7 +197,7 @@ def test_clean_shows_and_removes(tmp_path, always, monkeypatch):
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interrupted_command_says_what_is_kept(tmp_path, always, monkeypatch, number, code):
-    (tmp_path / "a.toml").write_text(SCENE)
+    (tmp_path / "a.toml").write_text(killed.SCENE)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("particlesim.cli.progress._Lines.__call__", lambda *a: stopped(9, Interrupted(number))(*a[1:]))
     result = CliRunner().invoke(cli.app, ["simulate", "a.toml"])

@@ -27,6 +27,7 @@ from particlesim.cli.sweep import sweep
 from particlesim.cli.tables import print_report, print_table
 from particlesim.cli.view import view
 from particlesim.core.interrupts import raise_signals
+from particlesim.core.last_words import watched
 from particlesim.core.output_path import check_output
 
 # What Typer raises for a wrong command line.
@@ -84,13 +85,14 @@ def main() -> None:
     """Run the command line.
 
     Exit code 2 for wrong input, 1 for what this machine cannot do, 3 for a drift of energy that was not allowed,
-    130 for Ctrl-C, 143 and 129 for SIGTERM and SIGHUP.
+    130 for Ctrl-C, 143 and 129 for SIGTERM and SIGHUP; that of the system if it is killed or crashes.
     """
     open_streams()
     warn_in_one_line()
-    raise_signals()
-    with one_line_output():
-        app()
+    with watched():
+        raise_signals()
+        with one_line_output():
+            app()
 
 
 @app.callback()

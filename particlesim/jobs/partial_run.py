@@ -15,6 +15,7 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 from particlesim.core.atomic_write import atomic_write
+from particlesim.core.last_words import last_words
 from particlesim.core.output_path import partial_folder
 from particlesim.core.text import shortened
 from particlesim.simulation.simulation import Simulation
@@ -89,12 +90,10 @@ class PartialRun:
             raise FileNotFoundError(f"{self._path}: what was done of it is gone, with {self.folder}") from error
         if isinstance(error, OSError) and (error.filename is None or self._is_ours(error.filename)):
             error.filename = str(self._path)
-        if error is not None and self.kept is not None and (self.folder / _INDEX).exists():
-            where = f"kept in {partial_folder(self._path)}"
-            if isinstance(error, SimulationError):
-                error.add_note(f"{_frames(self.kept)}, those before that, are {where}")
-            else:
-                error.add_note(f"{_frames(self.kept)} are {where}; --resume goes on with them")
+        if error is None:
+            last_words("")
+        elif self.kept is not None and (self.folder / _INDEX).exists():
+            error.add_note(self._in_words(", those before that," if isinstance(error, SimulationError) else ""))
 
     def _is_ours(self, file: str) -> bool:
         return Path(file).absolute().is_relative_to(self.folder)
@@ -130,7 +129,7 @@ class PartialRun:
             hidden.write_text(json.dumps(kept))
             _sync(hidden)
         _sync(self.folder)
-        self.kept = kept
+        self._count(kept)
         for old in self.folder.glob("*.ckpt"):
             if old.name != state:
                 old.unlink()
@@ -139,10 +138,21 @@ class PartialRun:
 
     def forget(self) -> None:
         """Let nothing be kept."""
-        self.kept = None
+        self._count(None)
         (self.folder / _INDEX).unlink(missing_ok=True)
         for file in self.folder.iterdir():
             file.unlink()
+
+    def _count(self, kept: dict[str, Any] | None) -> None:
+        """Let this be what was kept last."""
+        self.kept = kept
+        last_words("nothing was kept" if kept is None else self._in_words())
+
+    def _in_words(self, which: str = "") -> str:
+        """What is kept, and how to go on with it if there is no saying ``which`` frames those are."""
+        assert self.kept is not None
+        kept = f"{_frames(self.kept)}{which} are kept in {partial_folder(self._path)}"
+        return kept if which else f"{kept}; --resume goes on with them"
 
     def _look(self) -> None:
         """See what is there. PartialRunError if it is not to be gone on with, or cannot be."""
@@ -150,7 +160,7 @@ class PartialRun:
         if found is None:  # ended before anything was kept, or while it was removed
             self.forget()
             return
-        self.kept = found
+        self._count(found)
         where = f"{self._path}: there is a partial run of it, {_frames(found)}, in {partial_folder(self._path)}"
         remove = f"'particlesim clean --remove {self._path}' removes it"
         if not self._resume:
