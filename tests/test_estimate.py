@@ -34,3 +34,8 @@ def test_a_step_in_which_kernels_are_compiled_does_not_count(monkeypatch, slow):
 def test_two_steps_that_take_long_are_enough(monkeypatch):
     said = estimate._computing(Stepped(monkeypatch, [60.0, 60.0, 60.0]))
     assert said.startswith("about 16 h 40 min to simulate")
+
+
+def test_what_takes_next_to_no_time_says_so(monkeypatch):
+    said = estimate._computing(Stepped(monkeypatch, [1e-4] * 1100))
+    assert said.startswith("less than a second to simulate, as the first ")

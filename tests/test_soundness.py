@@ -80,6 +80,22 @@ def test_once_the_cause_is_gone_it_goes_on_to_the_same_frames(tmp_path, spoilt, 
         assert killed.content(tmp_path / name) == killed.content(tmp_path / f"straight_{name}")
 
 
+@pytest.mark.parametrize("end", [0.5, 1.0])
+@pytest.mark.parametrize(
+    ("factor", "line"),
+    [
+        (1e15, r"particle 5 \(particles\[1\] .*\) goes at \S+e\+1\d m/s, and time steps come to no end, at 0.35 s"),
+        (np.inf, r"velocity of particle 5 \(particles\[1\] of the scene\) is not finite at 0.35 s"),
+    ],
+)
+def test_a_frame_that_would_never_come_is_not_waited_for(factor, line, end):
+    simulation = ps.Simulation(gas(3))
+    simulation.run(duration=AT)
+    simulation.particles.velocity[5] *= factor
+    with pytest.raises(ps.SimulationError, match=line):
+        simulation.step_towards(end)
+
+
 @pytest.mark.parametrize(
     ("settings", "key"),
     [

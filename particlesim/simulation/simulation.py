@@ -25,7 +25,7 @@ from particlesim.setup.build import build
 from particlesim.simulation.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from particlesim.simulation.conserved import conserved
 from particlesim.simulation.flow import Flow, FlowState
-from particlesim.simulation.soundness import check_particles
+from particlesim.simulation.soundness import check_particles, too_fast
 from particlesim.trajectory.frames import Frame, Header, Ledger
 
 # A run of more time steps than this is refused: it would take years.
@@ -165,7 +165,9 @@ class Simulation:
         """
         if not math.isfinite(duration):
             raise ValueError(f"duration must be a finite number of seconds, not {duration!r}")
-        return math.ceil(duration / self.next_time_step() - 1e-9)
+        step = self.next_time_step()
+        steps = duration / step if step > 0.0 else math.inf
+        return math.ceil(steps - 1e-9) if steps < math.inf else math.inf
 
     @checked_arguments
     def run_until(self, end: float) -> None:
@@ -200,7 +202,10 @@ class Simulation:
 
     def _step_towards(self, end: float) -> None:
         left = end - self.time
-        parts = math.ceil(left / self.next_time_step() - 1e-9)
+        parts = self.steps_of(left)
+        if parts > MOST_STEPS:
+            check_particles(self.scene, self.model, self.time)
+            raise too_fast(self.scene, self.model, self.time)
         self._step(left / max(parts, 1))
         if parts <= 1:
             self._solver.state.time = end

@@ -1,5 +1,6 @@
 """What cannot be, looked for once a recorded frame: numbers that are not finite, particles behind walls, energy from
-nowhere. Each is said with the particle, the time, and the key of the scene that most likely leads to it.
+nowhere; and speeds at which the next frame would never come. Each is said with the particle, the time, and the key of
+the scene that most likely leads to it.
 """
 
 from __future__ import annotations
@@ -47,6 +48,15 @@ def check_energy(scene: Scene, model: Model, first: Ledger, now: Ledger) -> None
         fastest = b[np.argmax(b["mass"] * (b["velocity"] ** 2).sum(axis=1))]
         wrong = f"the energy has grown by {gain:.3g} J, where there were {drawn_on:.3g} J, most of it in {{}},"
         raise _error(scene, fastest, wrong, now.time)
+
+
+def too_fast(scene: Scene, model: Model, time: float) -> SimulationError:
+    """The error of particles that are so fast that time steps, in which they move a little, come to no end."""
+    b = model.particles
+    speed = np.linalg.norm(b["velocity"], axis=1)
+    fastest = int(np.argmax(speed))
+    wrong = f"{{}} goes at {speed[fastest]:.3g} m/s, and time steps come to no end,"
+    return _error(scene, b[fastest], wrong, time)
 
 
 def _error(scene: Scene, body: np.void, wrong: str, time: float) -> SimulationError:
