@@ -41,7 +41,7 @@ main()
 def ended(code, *arguments, **options):
     """How a program ends, and what is said then."""
     command = [sys.executable, "-c", code, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=100, **options)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600, **options)
     return done.returncode, done.stderr
 
 
