@@ -32,6 +32,10 @@ def uses_of_pictures(scene: Scene) -> Uses:
         uses["velocity"] = "the readout of the speed"
     if "speed" in shown:
         uses["velocity"] = "colour by_speed"
+    if scene.movie.shutter:
+        uses["velocity"] = "motion blur"
+        if "orientation" in uses:
+            uses["angular_momentum"] = "motion blur of a shape that turns"
     if "impacts" in shown:
         uses["impacts"] = "colour by_impacts"
     return uses

@@ -48,11 +48,21 @@ def passes_of(count: int) -> list[Pass]:
     ]
 
 
-def mean_of(pictures: Iterable[np.ndarray]) -> np.ndarray:
-    """The mean of pictures (h, w, 4) uint8."""
+def mean_of(pictures: Iterable[np.ndarray], *, of_light: bool = False) -> np.ndarray:
+    """The mean of pictures (h, w, 4) uint8: of their numbers, or of the light that these are the roots of."""
     coming = iter(pictures)
     first, count, total = next(coming), 1, None
     for picture in coming:
-        total = (first.astype(np.uint32) if total is None else total) + picture
+        if total is None:
+            total = _light(first) if of_light else first.astype(np.uint32)
+        total += _light(picture) if of_light else picture
         count += 1
-    return first if total is None else ((total + count // 2) // count).astype(np.uint8)
+    if total is None:
+        return first
+    mean = np.rint(np.sqrt(total / count)) if of_light else (total + count // 2) // count
+    return mean.astype(np.uint8)
+
+
+def _light(picture: np.ndarray) -> np.ndarray:
+    """What a picture is the root of, uint32: see ``light.py``."""
+    return np.square(picture, dtype=np.uint32)

@@ -7,6 +7,7 @@ from types import TracebackType
 import numpy as np
 
 from particlesim.rendering.camera import Camera, View
+from particlesim.rendering.exposure import moments_of
 from particlesim.rendering.gl import platform
 from particlesim.rendering.hud.history import History
 from particlesim.rendering.hud.labels import Labels
@@ -71,6 +72,7 @@ class Renderer:
         self._labels = Labels(scene, look.header, environment.dark)
         self._scenery = Scenery(scene, look.header)
         tables = self._scenery.tables
+        self._inradius = tables.inradius
         usual = float(np.median(tables.radius)) if len(tables.radius) else 0.0
         self._light = key_light(scene, round(quality.shadow * self._size[1]), usual)
         self._usual = usual
@@ -108,6 +110,18 @@ class Renderer:
         -------
         (height, width, 3) uint8, sRGB; (height, width, 4) without a background, as transparency.py has it.
         """
+        moments = moments_of(self._look.scene, self._look.header, frame, self._inradius)
+        # What is no more than half there is half as much of the picture: in light, but for what hides what is behind.
+        picture = mean_of(map(self._moment, moments), of_light=not self._look.scene.movie.transparent)
+        # OpenGL's first row is the lowest, and it has a fourth channel.
+        channels = self._look.scene.movie.channels
+        image = fxaa(picture) if self._quality.fxaa else np.ascontiguousarray(picture[::-1, :, :channels])
+        self._labels.draw(image, self._camera.view(frame.time), frame)
+        self._overlay.draw(image, frame, history or History())
+        return image
+
+    def _moment(self, frame: Frame) -> np.ndarray:
+        """The picture of particles at one time, (h, w, 4) uint8 sRGB, its first row the lowest."""
         view = self._camera.view(frame.time)
         particles = instances_of(self._look.scene, self._look.header, frame, self._scenery.tables)
         parts, whole = self._scenery.in_parts(particles)
@@ -139,13 +153,7 @@ class Renderer:
             depth += np.float32(1.0)
             return self._canvas.draw(self._bridge.Picture(self._view_block(through, projection), colours, depth))
 
-        # OpenGL's first row is the lowest, and it has a fourth channel.
-        picture = mean_of(map(drawn, passes_of(self._quality.passes)))
-        channels = self._look.scene.movie.channels
-        image = fxaa(picture) if self._quality.fxaa else np.ascontiguousarray(picture[::-1, :, :channels])
-        self._labels.draw(image, view, frame)
-        self._overlay.draw(image, frame, history or History())
-        return image
+        return mean_of(map(drawn, passes_of(self._quality.passes)))
 
     def _light_maps(
         self, view: Projection, instances: Instances, clusters: OcclusionClusters, one: Pass

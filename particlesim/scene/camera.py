@@ -10,6 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, Wr
 from particlesim.scene.base import (
     Finite,
     Flag,
+    Fraction,
     Model,
     NotNegative,
     Number,
@@ -196,6 +197,17 @@ class Movie(Model):
     fade: Annotated[NotNegative, must_be("a number of seconds of 0 or more")] = Field(
         default=0.0, description="from the background at the start and to it at the end [s]"
     )
+    shutter: Fraction = Field(
+        default=0.0, description="part of the time between pictures that it is open; what moves is blurred as far"
+    )
+    sub_frames: Annotated[int, Field(ge=2, le=64), whole, must_be("a whole number from 2 to 64")] = Field(
+        default=12, description="pictures that each is the mean of, where the shutter is open: it takes as much longer"
+    )
+
+    @property
+    def exposure(self) -> float:
+        """How long the shutter is open for each picture [s]."""
+        return self.shutter * self.speed / self.fps
 
     @property
     def transparent(self) -> bool:
