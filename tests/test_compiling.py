@@ -39,12 +39,12 @@ def test_what_is_compiled_is_not_compiled_again(monkeypatch):
     monkeypatch.setattr(compiling, "is_compiled", lambda module: True)
     monkeypatch.setattr(subprocess, "Popen", None)
     told = []
-    compiling.compile_kernels(SCENE, SCENE.movie, lambda *what: told.append(what))
+    compiling.compile_kernels(SCENE, SCENE, lambda *what: told.append(what))
     assert told == []
 
 
 def test_a_movie_is_compiled_by_three_processes(processes):
-    compiling.compile_kernels(SCENE, SCENE.movie, None)
+    compiling.compile_kernels(SCENE, SCENE, None)
     assert [_part(process) for process in processes] == ["collide", "draw"]
     assert [process.returncode for process in processes] == [0, 0]
 
@@ -52,13 +52,13 @@ def test_a_movie_is_compiled_by_three_processes(processes):
 def test_a_trajectory_needs_the_kernels_of_drawing_alone(processes):
     compiling.compile_kernels(SCENE, None, None)
     assert [_part(process) for process in processes] == ["collide"]
-    compiling.compile_kernels(None, SCENE.movie, None)
+    compiling.compile_kernels(None, SCENE, None)
     assert len(processes) == 1
 
 
 def test_a_process_that_fails_is_no_harm(processes, monkeypatch):
     monkeypatch.setattr(sys, "executable", "false")
-    compiling.compile_kernels(SCENE, SCENE.movie, None)
+    compiling.compile_kernels(SCENE, SCENE, None)
     assert [process.returncode for process in processes] == [1, 1]
 
 
@@ -68,7 +68,7 @@ def test_an_interruption_ends_the_processes(processes, monkeypatch):
 
     monkeypatch.setattr(compiling, "_small", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        compiling.compile_kernels(SCENE, SCENE.movie, None)
+        compiling.compile_kernels(SCENE, SCENE, None)
     assert [process.returncode for process in processes] == [-9, -9]
 
 
@@ -81,8 +81,27 @@ def test_kernels_are_counted(monkeypatch):
     told = []
     monkeypatch.setattr(compiling, "is_compiled", lambda module: False)
     monkeypatch.setattr(compiling, "_draw", _compile_one)
-    compiling.compile_kernels(None, SCENE.movie, lambda *what: told.append(what))
-    assert told == [(COMPILING, 1, compiling.COMPILATIONS["drawing"])]
+    compiling.compile_kernels(None, SCENE, lambda *what: told.append(what))
+    assert told == [(COMPILING, 1, compiling.COMPILATIONS["drawing"] + compiling.COMPILATIONS["occlusion"])]
+
+
+@pytest.mark.parametrize(
+    ("change", "part", "sign"),
+    [
+        ({"movie": {"quality": "normal"}}, "occlusion", "rendering.shading.ambient_occlusion"),
+        ({"movie": {"quality": "high"}}, "soft light", "rendering.shading.pixel_light"),
+        ({"movie": {"quality": "draft"}, "show": {"outlines": True}}, "outlines", "rendering.shading.outlines"),
+    ],
+)
+def test_kernels_that_only_some_looks_need_are_compiled_for_these(monkeypatch, change, part, sign):
+    told = []
+    monkeypatch.setattr(compiling, "is_compiled", lambda module: module != sign)
+    monkeypatch.setattr(compiling, "_draw", _compile_one)
+    draft = Scene(**{**dict(SCENE), "movie": {"quality": "draft"}})
+    compiling.compile_kernels(None, draft, lambda *what: told.append(what))
+    assert told == []
+    compiling.compile_kernels(None, Scene(**{**dict(SCENE), **change}), lambda *what: told.append(what))
+    assert told == [(COMPILING, 1, compiling.COMPILATIONS[part])]
 
 
 def test_kernels_compiled_apart_are_counted(monkeypatch, tmp_path):
@@ -91,7 +110,7 @@ def test_kernels_compiled_apart_are_counted(monkeypatch, tmp_path):
     speaker.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(speaker))
     told = []
-    with compiling._Tally(told.append) as tally, tally.apart("draw", SCENE.movie):
+    with compiling._Tally(told.append) as tally, tally.apart("draw", SCENE):
         _compile_one()
     assert told[-1] == 4
     assert told == sorted(told)

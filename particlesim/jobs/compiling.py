@@ -12,7 +12,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
-from typing import Any, TypeVar
+from typing import Any
 
 import numba
 import numpy as np
@@ -24,46 +24,56 @@ from particlesim.geometry import shapes
 from particlesim.jobs.frame_source import Progress, tell
 from particlesim.rendering import Renderer
 from particlesim.rendering.look import look_of
+from particlesim.rendering.quality import quality_of
 from particlesim.scene import Scene
-from particlesim.scene.camera import Movie
 from particlesim.scene.world import Solver
 from particlesim.simulation.simulation import Simulation
 from particlesim.trajectory.frames import Frame, Header
 
 # How many compilations there are, counted with an empty cache: this package's kernels and functions of numba's own.
-COMPILATIONS = {"simulating": 440, "drawing": 190}
+COMPILATIONS = {"simulating": 440, "drawing": 170, "occlusion": 20, "soft light": 50, "outlines": 2}
 
 # Modules of the kernels of each part that take longest; with one missing, the part has yet to be compiled.
 _SIGNS = {
     "simulating": ("dynamics.events.collision_prediction", "dynamics.events.event_queue"),
     "drawing": ("rendering.visibility.rasterise", "rendering.shading.shade"),
+    "occlusion": ("rendering.shading.ambient_occlusion",),
+    "soft light": ("rendering.shading.pixel_light",),
+    "outlines": ("rendering.shading.outlines",),
 }
 
-_Model = TypeVar("_Model", Scene, Movie)
 
-
-def compile_kernels(scene: Scene | None, movie: Movie | None, progress: Progress | None) -> None:
-    """Compile what simulating a scene and drawing a movie runs, as far as that was not done before; None for neither.
+def compile_kernels(scene: Scene | None, look: Scene | None, progress: Progress | None) -> None:
+    """Compile what simulating a scene and drawing a look run, as far as that was not done before; None for neither.
 
     ``progress`` is told how many kernels are compiled, and about how many there will be.
     """
-    scene, movie = _unless_compiled("simulating", scene), _unless_compiled("drawing", movie)
-    total = sum(COMPILATIONS[part] for part, model in (("simulating", scene), ("drawing", movie)) if model)
+    simulating = _missing([] if scene is None else ["simulating"])
+    drawing = _missing([] if look is None else _parts_of(look))
+    total = sum(COMPILATIONS[part] for part in simulating + drawing)
     # What is not on disk, as numba's own functions, is compiled by each process, and counted by each.
     with _Tally(lambda done: tell(progress, COMPILING, min(done, total - 1), total)) as tally:
-        if scene is not None:
-            with tally.apart("collide", scene.solver), nullcontext() if movie is None else tally.apart("draw", movie):
+        drawn = tally.apart("draw", _like(look)) if look is not None and drawing and simulating else nullcontext()
+        if scene is not None and simulating:
+            with tally.apart("collide", scene.solver), drawn:
                 simulation = _small("cube", scene.solver)
                 simulation.run(duration=1.0)
                 simulation.frame()
-        elif movie is not None:
-            _draw(movie)
+        elif look is not None and drawing:
+            _draw(_like(look))
 
 
-def _unless_compiled(part: str, model: _Model | None) -> _Model | None:
-    """``model``, if kernels of the part of the work that it is for have yet to be compiled."""
+def _missing(parts: list[str]) -> list[str]:
+    """Those parts of the work of which kernels have yet to be compiled."""
     config: Any = numba.config
-    return None if config.DISABLE_JIT or all(map(is_compiled, _SIGNS[part])) else model
+    return [part for part in parts if not config.DISABLE_JIT and not all(map(is_compiled, _SIGNS[part]))]
+
+
+def _parts_of(look: Scene) -> list[str]:
+    """The parts of the work that pictures take that look like this."""
+    quality = quality_of(look)
+    light = "soft light" if quality.sky else "occlusion" if quality.ambient_occlusion else None
+    return [part for part in ("drawing", light, "outlines" if look.show.outlines else None) if part]
 
 
 class _Listener(event.Listener):
@@ -97,7 +107,7 @@ class _Tally:
         self._selector.close()
 
     @contextmanager
-    def apart(self, part: str, model: Movie | Solver) -> Iterator[None]:
+    def apart(self, part: str, model: Scene | Solver) -> Iterator[None]:
         """Have a part compiled by a process of its own, and wait for it at the end of the block.
 
         Where that fails, kernels are compiled when they are called, and what is wrong is said then.
@@ -138,7 +148,7 @@ def compile_apart(part: str) -> None:
     with event.install_listener("numba:compile", _Listener(lambda: os.write(1, b"."))):
         if part == "draw":
             os.nice(10)  # others wait for the kernels of collisions
-            _draw(Movie.model_validate_json(table))
+            _draw(Scene.model_validate_json(table))
         else:
             _small("sphere", Solver.model_validate_json(table)).run(duration=1.0)
 
@@ -153,13 +163,18 @@ def _small(shape: str, solver: Solver) -> Simulation:
     return Simulation(Scene(world={"size": [4.0, 4.0, 4.0]}, solver=solver, particles=groups))
 
 
-def _draw(movie: Movie) -> None:
-    """Draw a cube and a sphere as in a movie."""
+def _like(look: Scene) -> Scene:
+    """A cube and a sphere in a small world, to be drawn like a scene."""
+    groups = [{"shape": "cube", "count": 1}, {"shape": "sphere", "count": 1}]
+    show = {"readout": False, "outlines": look.show.outlines}
+    return Scene(world={"size": [4.0, 4.0, 4.0]}, particles=groups, movie=look.movie, show=show)
+
+
+def _draw(scene: Scene) -> None:
+    """Draw the cube and the sphere."""
     one, zero, number = np.ones(2), np.zeros((2, 3)), np.arange(2)
     header = Header("", (shapes.box(), shapes.sphere()), number, one, number, one, np.ones((2, 3)))
     position, orientation = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
     frame = Frame(0.0, position, orientation, zero, zero, zero.astype(np.int64), np.zeros(2, dtype=np.int64))
-    groups = [{"shape": "cube", "count": 1}, {"shape": "sphere", "count": 1}]
-    scene = Scene(world={"size": [4.0, 4.0, 4.0]}, particles=groups, movie=movie, show={"readout": False})
     with Renderer(look_of(scene, header, frame)) as renderer:
         renderer.draw(frame)

@@ -273,7 +273,7 @@ def still(
 
 def _compile(source: Scene | Trajectory, look: Scene, progress: Progress | None) -> None:
     """Compile what pictures of a source need that look like this."""
-    compile_kernels(source if isinstance(source, Scene) else None, look.movie, progress)
+    compile_kernels(source if isinstance(source, Scene) else None, look, progress)
 
 
 def _scene_of(source: Scene | Trajectory) -> Scene:

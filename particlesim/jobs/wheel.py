@@ -20,7 +20,7 @@ _COMPILE = """
 from particlesim.jobs.compiling import compile_kernels
 from particlesim.scene import Scene
 scene = Scene(world={"size": [1, 1, 1]}, particles=[{"shape": "sphere", "count": 1}])
-compile_kernels(scene, scene.movie, print)
+compile_kernels(scene, scene, print)
 """
 
 
