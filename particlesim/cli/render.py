@@ -85,11 +85,11 @@ def render(
             if time is not None and value:
                 raise OptionError(f"{option}: of a movie, not of the one picture that --still asks for")
         chosen = None if time is not None else frames_asked(total, frames, every)
+        if chosen is not None:
+            check_sequence(path, len(chosen))
         from particlesim.simulation.needs import check_movie  # noqa: PLC0415
 
         check_movie(scene, path, 1 if chosen is None else len(chosen), simulated=subject is scene)
-        if chosen is not None:
-            check_sequence(path, len(chosen))
         from particlesim.jobs import movie  # noqa: PLC0415
 
         if time is None:

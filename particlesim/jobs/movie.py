@@ -35,6 +35,7 @@ from particlesim.rendering.video.segments import Segments
 from particlesim.scene import Scene
 from particlesim.scene.camera import Movie
 from particlesim.scene.file import load_scene
+from particlesim.setup.limits import check_limits
 from particlesim.simulation.needs import check_movie, check_simulation, check_transparency
 from particlesim.simulation.simulation import Simulation
 from particlesim.simulation.soundness import SimulationError
@@ -273,6 +274,8 @@ def still(
 
 def _compile(source: Scene | Trajectory, look: Scene, progress: Progress | None) -> None:
     """Compile what pictures of a source need that look like this."""
+    if isinstance(source, Scene):
+        check_limits(source)
     compile_kernels(source if isinstance(source, Scene) else None, look, progress)
 
 

@@ -25,6 +25,7 @@ from particlesim.scene.placements import ListPlacement, RowPlacement
 from particlesim.scene.surface import WALLS
 from particlesim.setup.fields import fields_of
 from particlesim.setup.initial_motion import random_quaternions, set_in_motion
+from particlesim.setup.limits import DEFAULT_DENSITY, check_fill
 from particlesim.setup.memory import check_memory
 from particlesim.setup.obstacles import Obstacle, obstruct
 from particlesim.setup.orientations import of_body_axes, quaternion_of
@@ -33,9 +34,6 @@ from particlesim.setup.rows import turned_along
 from particlesim.setup.scene_obstacles import drawn_shapes, material_of, obstacles_of
 from particlesim.setup.shape_reading import shape_of
 from particlesim.setup.space import Crowd, Space
-
-# Density of particles that give neither density nor mass: water [kg/m^3].
-_DEFAULT_DENSITY = 1000.0
 
 # Particles that a list puts into each other deeper than this fraction of their sizes are refused.
 _TOLERATED_OVERLAP = 1e-9
@@ -58,7 +56,7 @@ def build(scene: Scene, obstacles: Sequence[Obstacle] = ()) -> Model:
     to_come = particles[particles["group"] >= len(scene.particles)]
     particles = particles[particles["group"] < len(scene.particles)]
     volume = _volumes(shapes, particles)
-    _check_volume(scene, domain[0], volume)
+    check_fill(scene, float(volume.sum()) / math.prod(scene.world.size))
     own = obstacles_of(scene)
     model = assemble(shapes, particles, domain, materials_of(scene), [*own, *obstacles], pair_laws_of(scene))
     model = model._replace(obstacle_shapes=drawn_shapes(scene, own), fields=fields_of(scene))
@@ -180,7 +178,7 @@ def _particles(
     shape = np.array(shape_of_group)[group_of]
     size = np.concatenate([_sizes(g, r) for g, r in zip(scene.groups, randoms, strict=True)])
     volume = np.array([s.volume for s in shapes])[shape] * size**3
-    density = np.array([_DEFAULT_DENSITY if g.density is None else g.density for g in scene.groups])[group_of]
+    density = np.array([DEFAULT_DENSITY if g.density is None else g.density for g in scene.groups])[group_of]
     mass = np.array([math.nan if g.mass is None else g.mass for g in scene.groups])[group_of]
     density = np.where(np.isnan(mass), density, mass / volume)
     return make_particles(shapes, shape, group_of, size, density)
@@ -209,15 +207,6 @@ def _check_sizes(scene: Scene, domain: np.void, particles: np.ndarray) -> None:
 def _volumes(shapes: list[Shape], particles: np.ndarray) -> np.ndarray:
     """Volumes of particles (n,) BODY, (n,) [m^3]."""
     return np.array([s.volume for s in shapes])[particles["shape_row"]] * particles["scale"] ** 3
-
-
-def _check_volume(scene: Scene, domain: np.void, volume: np.ndarray) -> None:
-    """Particles, whose volumes (n,) [m^3] are given, must have room in a closed world."""
-    fill = float(volume.sum() / (domain["upper"] - domain["lower"]).prod())
-    if fill > 1.0 and not (domain["boundary"] == OPEN).any():
-        hints = [unit_hint(group) for group in scene.particles]
-        wrong = f"do not fit: their volumes add up to {fill:.3g} times the world's"
-        raise SceneError(wrong + max(hints), "particles")
 
 
 def _orientations(

@@ -12,10 +12,10 @@ from particlesim.core.durations import in_words
 from particlesim.core.jit import is_compiled
 from particlesim.scene import Scene
 from particlesim.scene.camera import Movie
-from particlesim.scene.file import SceneError
+from particlesim.setup.limits import check_limits, check_steps
 from particlesim.setup.memory import BYTES_PER_PARTICLE
 from particlesim.simulation.needs import movie_bytes, trajectory_bytes
-from particlesim.simulation.simulation import MOST_STEPS, Simulation
+from particlesim.simulation.simulation import Simulation
 
 # Seconds for which steps are measured, but for the slowest.
 _MEASURED = 1.0
@@ -29,6 +29,7 @@ _BYTES_OF_PROCESS = 400e6
 
 def estimate(scene: Scene) -> list[tuple[str, str]]:
     """Name and value of what one wants to know of a scene. SceneError if it cannot be built."""
+    check_limits(scene)
     simulation = Simulation(scene)
     check_end(simulation)
     world, movie = scene.world, scene.movie
@@ -50,12 +51,7 @@ def estimate(scene: Scene) -> list[tuple[str, str]]:
 
 def check_end(simulation: Simulation) -> None:
     """SceneError if there is no end to the simulation of a scene."""
-    scene = simulation.scene
-    needed = simulation.steps_of(scene.duration)
-    if needed > MOST_STEPS:
-        key = "duration" if scene.solver.time_step == "auto" else "solver.time_step"
-        value = scene.duration if scene.solver.time_step == "auto" else scene.solver.time_step
-        raise SceneError(f"takes about {needed:.0e} time steps; there may be up to {MOST_STEPS:.0e}", key, value)
+    check_steps(simulation.scene, simulation.steps_of(simulation.scene.duration), "about")
 
 
 def _computing(simulation: Simulation) -> str:

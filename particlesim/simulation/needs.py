@@ -48,9 +48,10 @@ def movie_bytes(movie: Movie, pictures: int, at_crf_18: float = _PIXEL) -> float
 
 
 def check_simulation(scene: Scene, path: Path) -> None:
-    """SceneError if a scene does not fit into memory, OutputError if its trajectory does not fit on the disk."""
+    """SceneError if a scene cannot be, or not in this memory; OutputError if its trajectory does not fit the disk."""
     check_memory(scene.number)
     _check_disk(path, trajectory_bytes(scene) + _CHECKPOINT * scene.number)
+    _check_limits(scene)
 
 
 def check_movie(scene: Scene, path: Path, pictures: int, simulated: bool) -> None:
@@ -63,6 +64,8 @@ def check_movie(scene: Scene, path: Path, pictures: int, simulated: bool) -> Non
     segment = 3 * math.prod(movie.size) * min(pictures, SEGMENT)
     # Segments are there until they are joined.
     _check_disk(path, 2.0 * movie_bytes(movie, pictures, _LEAST) + segment + state)
+    if simulated:
+        _check_limits(scene)
 
 
 def check_transparency(path: Path, movie: Movie) -> None:
@@ -70,6 +73,13 @@ def check_transparency(path: Path, movie: Movie) -> None:
     ending = path.suffix.lower()
     if movie.transparent and ending not in TRANSPARENT_ENDINGS:
         raise OutputError(f"{path}: {ending} has no transparent background; .webm and .png have")
+
+
+def _check_limits(scene: Scene) -> None:
+    """SceneError if a scene cannot be, as is known before kernels are compiled."""
+    from particlesim.setup.limits import check_limits  # noqa: PLC0415  (after what is light)
+
+    check_limits(scene)
 
 
 def _check_disk(path: Path, needed: float) -> None:

@@ -22,14 +22,12 @@ from particlesim.model.overlap import deepest_overlap
 from particlesim.model.system import Model
 from particlesim.scene import Scene
 from particlesim.setup.build import build
+from particlesim.setup.limits import MOST_STEPS
 from particlesim.simulation.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from particlesim.simulation.conserved import conserved
 from particlesim.simulation.flow import Flow, FlowState
 from particlesim.simulation.soundness import check_particles, too_fast
 from particlesim.trajectory.frames import Frame, Header, Ledger
-
-# A run of more time steps than this is refused: it would take years.
-MOST_STEPS = 1e12
 
 
 class Simulation:
