@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from particlesim.cli import main as cli
-from particlesim.core.interrupts import Interrupted, raise_signals
+from particlesim.core.interrupts import Interrupted, interruption, raise_signals
 
 # A kernel that returns named tuples is interrupted most of the time while numba makes Python objects of them.
 KERNEL = """
@@ -76,6 +76,34 @@ print(add(1, 2))
 """
 
 
+# A signal arrives as a module is read, the first of the program's own or one of those that commands need.
+EARLY = """
+import os, sys
+from particlesim.__main__ import main
+
+_, module, number, *sys.argv[1:] = sys.argv
+
+class Finder:
+    def find_spec(self, name, *_):
+        if name == module:
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), int(number))
+
+sys.meta_path.insert(0, Finder())
+main()
+"""
+
+# All is done, and a signal comes as Python takes leave.
+LATE = """
+import atexit, os, signal, sys
+from particlesim.__main__ import main
+
+atexit.register(lambda: os.kill(os.getpid(), signal.SIGTERM))
+sys.argv = ["particlesim", "schema"]
+main()
+"""
+
+
 @pytest.fixture
 def signals():
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
@@ -99,6 +127,50 @@ def test_an_interruption_amid_compiling_is_one_and_loses_no_code(tmp_path):
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=100, env=environment)
     assert (done.stdout, done.stderr, done.returncode) == ("interrupted\n3\n", "", 0)
+
+
+@pytest.mark.parametrize("module", ["particlesim.cli.main", "typer.main", "particlesim.scene.groups", "numba"])
+@pytest.mark.parametrize("command", ["check", "export"])
+@pytest.mark.parametrize(
+    ("number", "line"),
+    [(signal.SIGINT, "interrupted; nothing was written\n"), (signal.SIGTERM, "terminated; nothing was written\n")],
+)
+def test_an_early_interruption_is_said_in_one_line(tmp_path, module, command, number, line):
+    (tmp_path / "a.toml").write_text(
+        '[world]\nsize = [1, 1, 1]\n[[particles]]\nshape = "cube"\ncount = 1\nsize = 0.1\n'
+    )
+    call = [sys.executable, "-c", EARLY, module, str(int(number)), command, "a.toml"]
+    call += ["-o", "a.xyz"] if command == "export" else []
+    # A shell that runs tests in the background ignores Ctrl-C, and children inherit that.
+    told = {"preexec_fn": lambda: signal.signal(number, signal.SIG_DFL)}
+    done = subprocess.run(call, capture_output=True, text=True, check=False, timeout=60, cwd=tmp_path, **told)
+    assert (done.returncode, done.stdout, done.stderr.splitlines(True)[-1:]) == (128 + number, "", [line])
+    assert "Traceback" not in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["a.toml"]
+
+
+def test_an_interruption_that_another_error_takes_the_place_of_is_none_the_less_one(signals):
+    class Struck:
+        def __set_name__(self, owner, name):
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    raise_signals()
+    with pytest.raises(BaseException) as caught:  # a RuntimeError before Python 3.12
+        type("Owner", (), {"value": Struck()})
+    assert interruption(caught.value).number == signal.SIGTERM
+    assert interruption(ValueError("of it")).number == signal.SIGTERM
+
+
+def test_errors_without_an_interruption_are_none(signals):
+    assert interruption(ValueError("of a user")) is None
+    raise_signals()
+    assert interruption(ValueError("of a user")) is None
+
+
+def test_a_signal_after_the_work_says_nothing():
+    done = subprocess.run([sys.executable, "-c", LATE], capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (-signal.SIGTERM, "")
+    assert done.stdout.startswith("{")
 
 
 def test_signals_that_follow_at_once_do_not_disturb_the_cleaning_up(signals):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -13,9 +12,6 @@ import typer
 
 from particlesim.core.atomic_write import FULL
 
-# What is said of the signals that end a program.
-_ENDED = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
-
 
 class OptionError(ValueError):
     """The value of an option that is not allowed: the option, the value and what is allowed, in one line."""
@@ -24,28 +20,23 @@ class OptionError(ValueError):
 @contextmanager
 def one_line_errors(source: Path) -> Iterator[None]:
     """Expected failures as one line on standard error and an exit code; anything else is a bug and shows where."""
-    try:
-        from particlesim.scene.file import SceneError  # noqa: PLC0415
+    from particlesim.scene.file import SceneError  # noqa: PLC0415
 
-        try:
-            yield
-        except SceneError as error:
-            _fail_as(error, str(error if error.file else error.within(source)), 2)
-        except OSError as error:
-            if is_of_output(error):
-                raise
-            _fail_as(error, _described(error), 1)
-        except MemoryError as error:
-            _fail_as(error, ": ".join(filter(None, ["out of memory", str(error)])), 1)
-        except (ValueError, RuntimeError) as error:
-            # Errors of other modules of ours, which need not be imported to catch them.
-            if not type(error).__module__.startswith("particlesim."):
-                raise
-            _fail_as(error, str(error), 2 if isinstance(error, ValueError) else 1)
-    except KeyboardInterrupt as error:
-        number = getattr(error, "number", signal.SIGINT)
-        kept = "; ".join(getattr(error, "__notes__", ["nothing was written"]))
-        fail(f"{_ENDED[number]}; {kept}", 128 + number)
+    try:
+        yield
+    except SceneError as error:
+        _fail_as(error, str(error if error.file else error.within(source)), 2)
+    except OSError as error:
+        if is_of_output(error):
+            raise
+        _fail_as(error, _described(error), 1)
+    except MemoryError as error:
+        _fail_as(error, ": ".join(filter(None, ["out of memory", str(error)])), 1)
+    except (ValueError, RuntimeError) as error:
+        # Errors of other modules of ours, which need not be imported to catch them.
+        if not type(error).__module__.startswith("particlesim."):
+            raise
+        _fail_as(error, str(error), 2 if isinstance(error, ValueError) else 1)
 
 
 def _fail_as(error: Exception, message: str, code: int) -> NoReturn:

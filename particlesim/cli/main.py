@@ -26,7 +26,7 @@ from particlesim.cli.streams import one_line_output, open_streams, warn_in_one_l
 from particlesim.cli.sweep import sweep
 from particlesim.cli.tables import print_report, print_table
 from particlesim.cli.view import view
-from particlesim.core.interrupts import raise_signals
+from particlesim.core.interrupts import ended_by, interruption
 from particlesim.core.last_words import watched
 from particlesim.core.output_path import check_output
 
@@ -47,7 +47,10 @@ class _OneLineUsage(typer.core.TyperGroup):
 
 
 def _in_one_line(call: Callable[..., Any], *args: Any, **options: Any) -> Any:
-    """What ``call`` returns; a wrong command line ends the program in one line that says where there is help."""
+    """What ``call`` returns; a wrong command line ends the program in one line that says where there is help.
+
+    So does an interruption, of which Typer would say nothing.
+    """
     try:
         return call(*args, **options)
     except _UsageError as error:
@@ -56,6 +59,12 @@ def _in_one_line(call: Callable[..., Any], *args: Any, **options: Any) -> Any:
             raise
         command = error.ctx.command_path if error.ctx else "particlesim"
         fail(f"{message.rstrip('.')}; see {command} --help", 2)
+    except typer.Exit:
+        raise
+    except BaseException as error:
+        if (stopped := interruption(error)) is None:
+            raise
+        fail(*ended_by(stopped))
 
 
 app = typer.Typer(
@@ -82,17 +91,11 @@ Version = Annotated[
 
 
 def main() -> None:
-    """Run the command line.
-
-    Exit code 2 for wrong input, 1 for what this machine cannot do, 3 for a drift of energy that was not allowed,
-    130 for Ctrl-C, 143 and 129 for SIGTERM and SIGHUP; that of the system if it is killed or crashes.
-    """
+    """Run the command line: see ``particlesim.__main__``, which is ready for signals before this module is read."""
     open_streams()
     warn_in_one_line()
-    with watched():
-        raise_signals()
-        with one_line_output():
-            app()
+    with watched(), one_line_output():
+        app()
 
 
 @app.callback()

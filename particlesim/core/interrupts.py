@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import sys
 import time
@@ -10,6 +11,9 @@ from typing import Any, NoReturn
 
 # What ends a program from outside and leaves it time to clean up: Ctrl-C, kill, a terminal that closes.
 _SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+
+# What is said of them.
+_SAID = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
 
 # Signals that follow one within this time are the same wish, often from the same source; they do not disturb the
 # cleaning up [s].
@@ -24,33 +28,65 @@ class Interrupted(KeyboardInterrupt):
         self.number = number
 
 
-def raise_signals() -> None:
-    """From now on the signals that end a program raise Interrupted, but for those that are ignored (nohup)."""
-    raised: float | None = None
-    usual_hook = sys.unraisablehook
+class _Raising:
+    """What is called with a signal: raises Interrupted."""
 
-    def handle(number: int, frame: FrameType | None) -> None:
-        nonlocal raised
-        if raised is not None and time.monotonic() - raised < _GRACE:
+    def __init__(self) -> None:
+        self.first: Interrupted | None = None  # what has been raised
+        self._raised = -math.inf
+        self._usual_hook = sys.unraisablehook
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        if time.monotonic() - self._raised < _GRACE:
             return
-        raised = time.monotonic()
+        self._raised = time.monotonic()
+        self.first = self.first or Interrupted(number)
         caller = _waiting_for_results(frame)
         if caller is None:
             raise Interrupted(number)
         _raise_in(caller, number)
 
-    def hook(lost: Any) -> None:
-        # What Python cannot raise, such as in a __del__, it tells and forgets: the program would go on. What is left
-        # half made by an interruption may fail as it is taken apart, which is nobody's concern any more.
+    def hook(self, lost: Any) -> None:
+        """Raise what Python cannot, such as in a __del__: it tells and forgets it, and the program would go on."""
         if isinstance(lost.exc_value, Interrupted):
             _raise_in(sys._getframe(1), lost.exc_value.number)
-        elif raised is None:
-            usual_hook(lost)
+        elif self.first is None:  # what is left half made may fail as it is taken apart, which is nobody's concern
+            self._usual_hook(lost)
 
+
+def raise_signals() -> None:
+    """From now on the signals that end a program raise Interrupted, but for those that are ignored (nohup)."""
+    handler = _Raising()
     for number in _SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, handle)
-    sys.unraisablehook = hook
+            signal.signal(number, handler)
+    sys.unraisablehook = handler.hook
+
+
+def interruption(error: BaseException) -> KeyboardInterrupt | None:
+    """The interruption that an error is, or is of; None if there was none.
+
+    Pydantic, and Python itself where it makes a class, put an error of their own in place of one that is raised amid
+    their work, as a signal may be that comes while modules are read.
+    """
+    if isinstance(error, KeyboardInterrupt):
+        return error
+    handlers = (signal.getsignal(number) for number in _SIGNALS)
+    return next((handler.first for handler in handlers if isinstance(handler, _Raising)), None)
+
+
+def end_by_signals() -> None:
+    """From now on these signals end the program at once, and raise nothing: all is done, and Python takes leave."""
+    for number in _SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def ended_by(error: KeyboardInterrupt) -> tuple[str, int]:
+    """What is said of an interruption, in a line with the notes on it of what was kept, and the exit code."""
+    number = getattr(error, "number", signal.SIGINT)
+    kept = "; ".join(getattr(error, "__notes__", ["nothing was written"]))
+    return f"{_SAID[number]}; {kept}", 128 + number
 
 
 def _waiting_for_results(frame: FrameType | None) -> FrameType | None:

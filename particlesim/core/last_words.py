@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import faulthandler
 import os
+import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -47,6 +48,8 @@ def _pipe_to_listener() -> int | None:
     """The end of a pipe to a new process that listens to it; None if there is no room for one more process."""
     heard, told = os.pipe()
     os.set_blocking(told, False)  # who stops the listener does not stop the work
+    # What asks the program to end, and the group that it is in, is not for the listener.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
     try:
         listener = os.fork()
     except OSError:
@@ -56,6 +59,8 @@ def _pipe_to_listener() -> int | None:
         if listener == 0:
             os.close(told)
             _listen(heard)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
     os.close(heard)
     return told if told >= 0 else None
 
