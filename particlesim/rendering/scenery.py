@@ -14,6 +14,7 @@ from particlesim.rendering.shading.colour import obstacle_colours
 from particlesim.rendering.visibility.geometry_tables import BODY, GeometryTables, geometry_tables, joined
 from particlesim.rendering.visibility.instances import Instances
 from particlesim.rendering.visibility.rasterise import VisibilityBuffer
+from particlesim.rendering.visibility.rims import rims_of
 from particlesim.scene import Scene
 from particlesim.setup.obstacles import poses_at
 from particlesim.setup.scene_obstacles import obstacles_of
@@ -41,10 +42,12 @@ class Scenery:
 
     def __init__(self, scene: Scene, header: Header) -> None:
         particles = geometry_tables(header)
-        self.tables = particles._replace(shapes=stack_shapes((*header.shapes, *header.obstacles), drawn=True))
+        every = (*header.shapes, *header.obstacles)
+        shapes = stack_shapes(every, drawn=True)
+        self.tables = particles._replace(shapes=shapes, rim=rims_of(every, shapes))
         self._has_compounds = any(shape.parts for shape in header.shapes)
         self._middle = np.zeros((len(self.tables.shapes.shape), 3))  # of parts of compounds, at size 1 [m]
-        for row, shape in zip(self.tables.shapes.shape, (*header.shapes, *header.obstacles), strict=False):
+        for row, shape in zip(self.tables.shapes.shape, every, strict=False):
             for number, part in enumerate(shape.parts, int(row["first_part"])):
                 self._middle[number] = middle_of(part)
         self._obstacles = obstacles_of(scene, header.obstacles)
@@ -77,9 +80,8 @@ class Scenery:
         radius = np.concatenate([np.zeros(0), *(part.radius for part in parts)])
         orientation = pose["orientation"][each]
         position = pose["position"][each] + (rotations_of(orientation).apply(middle) if len(each) else middle)
-        return Instances(
-            position, orientation, GeometryTables(self.tables.shapes, body, radius, np.zeros(len(each))), which[each]
-        )
+        tables = GeometryTables(self.tables.shapes, self.tables.rim, body, radius, np.zeros(len(each)))
+        return Instances(position, orientation, tables, which[each])
 
     def in_parts(self, particles: Instances) -> tuple[Instances, np.ndarray]:
         """Particles as they are drawn, each part of a compound by itself; which of the particles each is of, (m,)."""
@@ -96,9 +98,8 @@ class Scenery:
         parts["shape"] = np.where(compound, first, body["shape"])[each] + number
         orientation, of_size_1 = particles.orientation[each], shapes[["radius", "inradius"]][parts["shape"]]
         middle = self._middle[parts["shape"]] * parts["size"][:, None]
-        tables = GeometryTables(
-            self.tables.shapes, parts, of_size_1["radius"] * parts["size"], of_size_1["inradius"] * parts["size"]
-        )
+        radii = (of_size_1[name] * parts["size"] for name in ("radius", "inradius"))
+        tables = GeometryTables(self.tables.shapes, self.tables.rim, parts, *radii)
         position = particles.position[each] + (rotations_of(orientation).apply(middle) if len(each) else middle)
         return Instances(position, orientation, tables, particles.bodies(each)), each
 

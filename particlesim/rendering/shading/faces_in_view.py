@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from particlesim.core.constants import TRIANGLE
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
 from particlesim.core.math3d import axpy, cross, dot, load_vec3, norm, scale, set_vec3, store_vec3, sub
 from particlesim.core.parallel import ThreadTeam
@@ -74,12 +73,13 @@ def _fill(which, indices, faces, first_edge, world, strip, view):
         if faces[body.shape]:
             centre = in_view(strip, load_vec3(position, i))
             placed = body.shape, body.size, centre, view_rotation(strip.axes, orientation, i)
-            _fill_polyhedron(placed, tables.shapes, strip.scale, first_edge[k], view, view.start[k])
+            _fill_polyhedron(placed, tables, strip.scale, first_edge[k], view, view.start[k])
 
 
 @kernel
-def _fill_polyhedron(placed, shapes, pixels, edge, view, row):
+def _fill_polyhedron(placed, tables, pixels, edge, view, row):
     """Fill in the faces that a polyhedron turns to the eye; ``edge``, ``row``: its first edge and face in ``view``."""
+    shapes = tables.shapes
     shape, centre = shapes.shape[placed[0]], placed[2]
     distance = norm(centre)
     for f in range(shape.first_face, shape.last_face):
@@ -88,26 +88,29 @@ def _fill_polyhedron(placed, shapes, pixels, edge, view, row):
         offset = dot(normal, centre) + face.offset * placed[1]
         if offset < 0.0:
             set_vec3(out.normal, normal)
-            out.facing, out.first, out.last = -dot(normal, centre) / distance, edge, edge
-            # The edges of a mesh's triangles are inner ones: they are not to be seen.
-            if shape.kind != TRIANGLE:
-                out.last += face.last - face.first
-                _fill_edges(placed, (normal, offset), face, shapes, pixels, view.edge, edge)
+            out.facing, out.first = -dot(normal, centre) / distance, edge
+            out.last = _fill_edges(placed, (normal, offset), face, tables, pixels, view.edge, edge)
         edge += face.last - face.first
         row += 1
 
 
 @kernel
-def _fill_edges(placed, plane, face, shapes, pixels, form, row):
-    """Fill in the edges of a face: how far what a ray meets in a plane is from a line, over its depth, is linear."""
+def _fill_edges(placed, plane, face, tables, pixels, form, row):
+    """Fill in the edges of a face that are to be seen, from ``row`` of ``form`` on; returns the row after them.
+
+    How far what a ray meets in a plane is from a line, over its depth, is linear.
+    """
     normal, offset = plane
-    here = _corner(placed, shapes, face.last - 1)
+    shapes, before = tables.shapes, face.last - 1
     for k in range(face.first, face.last):
-        before, here = here, _corner(placed, shapes, k)
-        inward = cross(sub(here, before), normal)  # so in axes that are left-handed, as these are
-        inward = scale(inward, pixels / norm(inward))
-        store_vec3(form, row, axpy(inward, normal, -dot(inward, here) / offset))
-        row += 1
+        if tables.rim[k]:
+            here = _corner(placed, shapes, k)
+            inward = cross(sub(here, _corner(placed, shapes, before)), normal)  # so in left-handed axes, as these are
+            inward = scale(inward, pixels / norm(inward))
+            store_vec3(form, row, axpy(inward, normal, -dot(inward, here) / offset))
+            row += 1
+        before = k
+    return row
 
 
 @kernel
