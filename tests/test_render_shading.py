@@ -139,7 +139,7 @@ def test_faces_that_are_turned_to_the_eye_are_tabled_with_their_edges():
             assert face["normal"] == pytest.approx(normal, abs=1e-6)
             assert face["facing"] == pytest.approx(-normal @ middle / np.linalg.norm(middle), abs=1e-6)
             # Each corner is on two of the edges, and their middle on none but within all.
-            edges = view.edge[face["first"] : face["last"]].astype(float)
+            edges = view.edge[face["first"] : face["last"], 0].astype(float)
             off = corners / corners[:, 2:] @ edges.T
             assert len(edges) == len(loop) and (np.sort(np.abs(off), axis=1)[:, :2] < 1e-2).all()
             inner = corners.mean(axis=0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from particlesim.core.constants import TRIANGLE
 from particlesim.core.rotations import rotations_of
-from particlesim.geometry.shape_table import middle_of, stack_shapes
+from particlesim.geometry.shape_table import stack_shapes
 from particlesim.geometry.shapes import Shape
 from particlesim.rendering.shading.colour import obstacle_colours
 from particlesim.rendering.visibility.geometry_tables import BODY, GeometryTables, geometry_tables, joined
@@ -44,12 +44,9 @@ class Scenery:
         particles = geometry_tables(header)
         every = (*header.shapes, *header.obstacles)
         shapes = stack_shapes(every, drawn=True)
-        self.tables = particles._replace(shapes=shapes, rim=rims_of(every, shapes))
+        self.tables = particles._replace(shapes=shapes, rims=rims_of(every, shapes))
         self._has_compounds = any(shape.parts for shape in header.shapes)
-        self._middle = np.zeros((len(self.tables.shapes.shape), 3))  # of parts of compounds, at size 1 [m]
-        for row, shape in zip(self.tables.shapes.shape, every, strict=False):
-            for number, part in enumerate(shape.parts, int(row["first_part"])):
-                self._middle[number] = middle_of(part)
+        self._middle = self.tables.rims.middle
         self._obstacles = obstacles_of(scene, header.obstacles)
         self._size = np.array([o.size if o.shape.is_bounded else 1.0 for o in self._obstacles])
         self._parts = [self._parts_of(k, shape, len(header.shapes) + k) for k, shape in enumerate(header.obstacles)]
@@ -80,7 +77,7 @@ class Scenery:
         radius = np.concatenate([np.zeros(0), *(part.radius for part in parts)])
         orientation = pose["orientation"][each]
         position = pose["position"][each] + (rotations_of(orientation).apply(middle) if len(each) else middle)
-        tables = GeometryTables(self.tables.shapes, self.tables.rim, body, radius, np.zeros(len(each)))
+        tables = GeometryTables(self.tables.shapes, self.tables.rims, body, radius, np.zeros(len(each)))
         return Instances(position, orientation, tables, which[each])
 
     def in_parts(self, particles: Instances) -> tuple[Instances, np.ndarray]:
@@ -99,7 +96,7 @@ class Scenery:
         orientation, of_size_1 = particles.orientation[each], shapes[["radius", "inradius"]][parts["shape"]]
         middle = self._middle[parts["shape"]] * parts["size"][:, None]
         radii = (of_size_1[name] * parts["size"] for name in ("radius", "inradius"))
-        tables = GeometryTables(self.tables.shapes, self.tables.rim, parts, *radii)
+        tables = GeometryTables(self.tables.shapes, self.tables.rims, parts, *radii)
         position = particles.position[each] + (rotations_of(orientation).apply(middle) if len(each) else middle)
         return Instances(position, orientation, tables, particles.bodies(each)), each
 

@@ -18,6 +18,9 @@ from particlesim.rendering.visibility.scan_lines import in_view, rotated, view_r
 # rows first:last of FacesInView.edge.
 FACE_IN_VIEW = record([("normal", "f4", (3,)), ("facing", "f4"), ("first", "i8"), ("last", "i8")])
 
+# A form of rays that is positive for all of them.
+_EVERYWHERE = 0.0, 0.0, 1.0
+
 
 class FacesInView(NamedTuple):
     """The faces that some polyhedra turn to the eye; what there is of the others means nothing.
@@ -27,9 +30,9 @@ class FacesInView(NamedTuple):
     start : (k,) int64
         Where those of each polyhedron begin in ``face``.
     face : (f,) FACE_IN_VIEW
-    edge : (e, 3) float32
+    edge : (e, 3, 3) float32
         Of each edge what, times a ray of depth 1, is how far from the edge within the face the ray meets it, as if that
-        were seen from ahead [pixels].
+        were seen from ahead [pixels], and likewise how far on from where it begins to be seen, and to where it ends.
     """
 
     start: np.ndarray
@@ -40,19 +43,19 @@ class FacesInView(NamedTuple):
 def faces_in_view(instances: Instances, indices: np.ndarray, projection: Projection) -> FacesInView:
     """Of the instances ``indices`` (k,), the faces of those that are polyhedra without rounding."""
     shapes = instances.tables.shapes
-    loop_ends = np.append(0, shapes.face["last"])
-    faces, corners = (
+    rims = instances.tables.rims.first
+    faces, edges = (
         np.where(shapes.shape["rounding"] > 0.0, 0, ends[shapes.shape["last_face"]] - ends[shapes.shape["first_face"]])
-        for ends in (np.arange(len(loop_ends)), loop_ends)
+        for ends in (np.arange(len(rims)), rims)
     )
     of_each = instances.tables.body["shape"][indices]
-    end, last_edge = np.cumsum(faces[of_each]), np.cumsum(corners[of_each])
+    end, last_edge = np.cumsum(faces[of_each]), np.cumsum(edges[of_each])
     view = FacesInView(
         start=end - faces[of_each],
         face=np.empty(end[-1] if len(end) else 0, dtype=FACE_IN_VIEW),
-        edge=np.empty((last_edge[-1] if len(end) else 0, 3), dtype=np.float32),
+        edge=np.empty((last_edge[-1] if len(end) else 0, 3, 3), dtype=np.float32),
     )
-    strip, first_edge = projection.strip(0, 0), last_edge - corners[of_each]
+    strip, first_edge = projection.strip(0, 0), last_edge - edges[of_each]
     world = instances.position, instances.orientation, instances.tables
 
     def fill(_: int, first: int, last: int) -> None:
@@ -79,41 +82,45 @@ def _fill(which, indices, faces, first_edge, world, strip, view):
 @kernel
 def _fill_polyhedron(placed, tables, pixels, edge, view, row):
     """Fill in the faces that a polyhedron turns to the eye; ``edge``, ``row``: its first edge and face in ``view``."""
-    shapes = tables.shapes
-    shape, centre = shapes.shape[placed[0]], placed[2]
-    distance = norm(centre)
+    shapes, rims, (number, size, centre, axes) = tables.shapes, tables.rims, placed
+    shape = shapes.shape[number]
+    body = axpy(centre, rotated(axes, load_vec3(rims.middle, number)), -size)
+    distance = norm(body)
     for f in range(shape.first_face, shape.last_face):
         face, out = shapes.face[f], view.face[row]
-        normal = rotated(placed[3], face.normal)
-        offset = dot(normal, centre) + face.offset * placed[1]
+        normal = rotated(axes, face.normal)
+        offset = dot(normal, centre) + face.offset * size
         if offset < 0.0:
             set_vec3(out.normal, normal)
-            out.facing, out.first = -dot(normal, centre) / distance, edge
-            out.last = _fill_edges(placed, (normal, offset), face, tables, pixels, view.edge, edge)
-        edge += face.last - face.first
+            out.facing, out.first = -dot(normal, body) / distance, edge
+            for r in range(rims.first[f], rims.first[f + 1]):
+                _fill_edge(placed, (normal, offset), rims, r, pixels, view.edge[edge])
+                edge += 1
+            out.last = edge
         row += 1
 
 
 @kernel
-def _fill_edges(placed, plane, face, tables, pixels, form, row):
-    """Fill in the edges of a face that are to be seen, from ``row`` of ``form`` on; returns the row after them.
-
-    How far what a ray meets in a plane is from a line, over its depth, is linear.
-    """
+def _fill_edge(placed, plane, rims, r, pixels, form):
+    """Fill in an edge of a face: how far what a ray meets in a plane is from a line, over its depth, is linear."""
     normal, offset = plane
-    shapes, before = tables.shapes, face.last - 1
-    for k in range(face.first, face.last):
-        if tables.rim[k]:
-            here = _corner(placed, shapes, k)
-            inward = cross(sub(here, _corner(placed, shapes, before)), normal)  # so in left-handed axes, as these are
-            inward = scale(inward, pixels / norm(inward))
-            store_vec3(form, row, axpy(inward, normal, -dot(inward, here) / offset))
-            row += 1
-        before = k
-    return row
+    line = rims.line[r]
+    here = _corner(placed, line, 1)
+    way = sub(here, _corner(placed, line, 0))
+    inward = cross(way, normal)  # so in axes that are left-handed, as these are
+    inward = scale(inward, pixels / norm(inward))
+    store_vec3(form, 0, axpy(inward, normal, -dot(inward, here) / offset))
+    if rims.whole[r]:
+        store_vec3(form, 1, _EVERYWHERE)
+        store_vec3(form, 2, _EVERYWHERE)
+        return
+    way = scale(way, pixels / norm(way))
+    store_vec3(form, 1, axpy(way, normal, -dot(way, _corner(placed, line, 2)) / offset))
+    back = scale(way, -1.0)
+    store_vec3(form, 2, axpy(back, normal, -dot(back, _corner(placed, line, 3)) / offset))
 
 
 @kernel
-def _corner(placed, shapes, k):
-    """A corner of a face in view coordinates."""
-    return axpy(placed[2], rotated(placed[3], load_vec3(shapes.vertex, shapes.loop[k])), placed[1])
+def _corner(placed, line, k):
+    """A point of a line in view coordinates."""
+    return axpy(placed[2], rotated(placed[3], load_vec3(line, k)), placed[1])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from particlesim.core.jit import kernel
@@ -54,10 +56,33 @@ def find_rim(span, face, edges, row):
     share[:] = NONE
     left, right = row.aside[first], row.aside[last - 1]
     for e in range(face.first, face.last):
-        ahead = edges[e, 1] * v + edges[e, 2]
-        start, end = edges[e, 0] * left + ahead, edges[e, 0] * right + ahead
+        start, end = _ends(edges[e, 0], left, right, v)
         if min(start, end) < _RIM:
             slope = (end - start) / np.float32(max(count - 1, 1))
-            for k in range(count):
+            low, high = _beside(edges[e], left, right, v, count)
+            for k in range(low, high):
                 near = min(_SLOPE * (_RIM - (start + slope * np.float32(k))), ONE)
                 share[k] = max(share[k], near)
+
+
+@kernel
+def _ends(form, left, right, v):
+    """A form of rays at the first and the last ones of a span."""
+    ahead = form[1] * v + form[2]
+    return form[0] * left + ahead, form[0] * right + ahead
+
+
+@kernel
+def _beside(edge, left, right, v, count):
+    """The first, and past the last, of ``count`` pixels of a span that are beside what is seen of an edge."""
+    low, high = 0, count
+    for side in range(1, 3):
+        start, end = _ends(edge[side], left, right, v)
+        if start < NONE and end < NONE:
+            return 0, 0
+        zero = np.float32(count - 1) * start / (start - end) if start != end else NONE
+        if start < NONE:
+            low = max(low, math.ceil(zero))
+        elif end < NONE:
+            high = min(high, math.floor(zero) + 1)
+    return low, high

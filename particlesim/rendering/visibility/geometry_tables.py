@@ -9,7 +9,7 @@ import numpy as np
 from particlesim.core.jit import kernel
 from particlesim.core.records import record
 from particlesim.geometry.shape_table import ShapeTable, stack_shapes
-from particlesim.rendering.visibility.rims import rims_of
+from particlesim.rendering.visibility.rims import Rims, rims_of
 from particlesim.trajectory.frames import Header
 
 # A body: number of its shape, and the factor on that of size 1 [m].
@@ -27,8 +27,8 @@ class GeometryTables(NamedTuple):
     ----------
     shapes : ShapeTable
         Their shapes of size 1.
-    rim : (l,) bool
-        Whether the edge that leads to each corner of ``shapes.loop`` is to be seen.
+    rims : Rims
+        Their edges that are to be seen.
     body : (n,) BODY
         Which shape each body has, and its size.
     radius, inradius : (n,) float64
@@ -36,7 +36,7 @@ class GeometryTables(NamedTuple):
     """
 
     shapes: ShapeTable
-    rim: np.ndarray
+    rims: Rims
     body: np.ndarray
     radius: np.ndarray
     inradius: np.ndarray
@@ -53,13 +53,13 @@ def geometry_tables(header: Header) -> GeometryTables:
 
 def taken(tables: GeometryTables, rows: np.ndarray) -> GeometryTables:
     """Some of the bodies of a table."""
-    return GeometryTables(tables.shapes, tables.rim, *(column[rows] for column in tables[2:]))
+    return GeometryTables(tables.shapes, tables.rims, *(column[rows] for column in tables[2:]))
 
 
 def joined(some: GeometryTables, more: GeometryTables) -> GeometryTables:
     """The bodies of two tables that have the same shapes."""
     body, radius, inradius = (np.concatenate([a, b]) for a, b in zip(some[2:], more[2:], strict=True))
-    return GeometryTables(some.shapes, some.rim, body, radius, inradius)
+    return GeometryTables(some.shapes, some.rims, body, radius, inradius)
 
 
 @kernel
