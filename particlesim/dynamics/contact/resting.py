@@ -24,7 +24,14 @@ from particlesim.dynamics.contact.island_step import (
     write_obstacles,
 )
 from particlesim.dynamics.contact.lasting_contacts import Motion, Search, contacts_of, new_search, resting_on_obstacles
-from particlesim.dynamics.contact.lasting_islands import forces_after, gathered, mean_forces, warm_start
+from particlesim.dynamics.contact.lasting_islands import (
+    borne_impulses,
+    forces_after,
+    gathered,
+    joined,
+    mean_forces,
+    warm_start,
+)
 from particlesim.dynamics.contact.position_correction import place_obstacles_ahead
 from particlesim.dynamics.contact.sleep import (
     borne_asleep,
@@ -144,7 +151,7 @@ class RestingContacts:
                 warm_start(islands, state.forces, bodies)
                 left = self._step(islands, duration, self._fields_until - state.time)
                 kept = kept_forces(state.forces, motion.held)
-                means = np.concatenate([kept, mean_forces(islands, bodies, duration)])
+                means = joined([kept, mean_forces(islands, bodies, duration)])
                 woken = unbalanced(system, means, motion.held, state.asleep, (WAKE_AT_ONCE, np.inf))
             if woken.any():
                 wake(state, woken, wakes, bodies)
@@ -158,7 +165,7 @@ class RestingContacts:
                 break
             found = changes_ahead(system, motion.spin, duration, islands.member, self._ahead)
             motion = motion._replace(change=np.maximum(CHANGE_MARGIN * motion.change, CHANGE_MARGIN * found))
-        state.forces = np.concatenate([kept, forces_after(islands, bodies)])
+        state.forces = joined([kept, forces_after(islands, bodies)])
         # What is less does not sink in by more than is corrected.
         counts = max(self._pull * duration, CORRECTED_DEPTH * self._inradius * RESTING_SUBSTEPS / duration)
         woken = unbalanced(system, means, motion.held, state.asleep, (WAKE_BALANCE, SLEEP_SPEED))
@@ -204,7 +211,7 @@ class RestingContacts:
             ends = ends[ends < system.particles]
             indices = np.unique(ends[search.round[ends] < 0]).astype(np.int64)
             number += 1
-        return np.concatenate([p for p, _ in parts]), np.concatenate([t for _, t in parts])
+        return joined([p for p, _ in parts]), joined([t for _, t in parts])
 
     def _contacts_in_round(
         self,
@@ -273,20 +280,8 @@ class RestingContacts:
 
     def _borne(self, islands: Islands, unresolved: bool) -> Borne:
         """What the contacts bore."""
-        points, impulse = islands.points, islands.terms["impulse"]
-        along = (points["normal"] * impulse).sum(axis=1)
-        wall = self._system.body["wall"][points["b"]]
-        on_wall, on_particle = wall >= 0, points["b"] < self._system.particles
-        shear = np.zeros((6, 3))
-        np.add.at(shear, wall[on_wall], (impulse - along[:, None] * points["normal"])[on_wall])
-        return Borne(
-            np.bincount(wall[on_wall], along[on_wall], minlength=6),
-            shear,
-            float(((points["arm_a"] - points["arm_b"]) * impulse)[on_particle].sum()),
-            islands.lost.sum(axis=0),
-            float(islands.work.sum()),
-            unresolved,
-        )
+        wall, shear, virial = borne_impulses(self._system, islands.points, islands.terms)
+        return Borne(wall, shear, virial, islands.lost.sum(axis=0), float(islands.work.sum()), unresolved)
 
 
 def forget_clearance(state: SolverState, neighbours: NeighbourList) -> None:

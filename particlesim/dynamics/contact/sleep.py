@@ -146,7 +146,7 @@ def fall_asleep(system: System, state: SolverState, members: np.ndarray) -> tupl
     gravity = float(np.linalg.norm(system.domain[0]["gravity"]))
     tired = np.zeros(system.particles, dtype=np.bool_)
     still = state.time - state.still["since"][members]
-    of_members = particle[members]
+    of_members = particle.take(members)
     lies = (of_members["resting"] != 0) & state.lasting[members].astype(np.bool_)
     tired[members] = lies & (gravity * still**2 >= SLEEP_TIME**2 * of_members["radius"])
     if not tired.any():
@@ -193,7 +193,7 @@ def _borne_forces(system, forces, asleep):
 def kept_forces(forces: np.ndarray, held: np.ndarray) -> np.ndarray:
     """Those of ``forces`` (k,) FORCE that act between bodies that are held."""
     a, b = np.divmod(forces["contact"], len(held))
-    return forces[held[a] & held[b]]
+    return forces.compress(held[a] & held[b])
 
 
 def borne_asleep(system: System, state: SolverState, pushed: np.ndarray, duration: float) -> Borne:
