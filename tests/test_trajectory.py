@@ -28,6 +28,17 @@ def run(tmp_path):
     return sim, frames, tmp_path / "run.gsd"
 
 
+def test_frames_are_counted_from_the_end_too(run):
+    _, frames, path = run
+    with Trajectory(path) as trajectory:
+        for k in range(-4, 0):
+            assert trajectory[k].time == trajectory.time(k) == trajectory.ledger(k).time == frames[k].time
+            assert np.array_equal(trajectory[k].impacts, frames[k].impacts)
+        for k in (-5, 4):
+            with pytest.raises(IndexError, match=rf"run.gsd: frames are 0 to 3, or -4 to -1, there is no {k}$"):
+                trajectory[k]
+
+
 def test_what_is_written_is_read(run):
     sim, frames, path = run
     with Trajectory(path) as trajectory:

@@ -233,15 +233,17 @@ class Trajectory:
         if self._is_own and not all(self._chunks.has(name) for name in names):
             raise TrajectoryError(f"{self.path}: {OLDER}")
 
-    def _check_number(self, k: int) -> None:
-        """IndexError if there is no frame ``k``."""
-        if not 0 <= k < len(self):
-            raise IndexError(f"{self.path}: frames are 0 to {len(self) - 1}, there is no {shown(k)}")
+    def _number(self, k: int) -> int:
+        """The number of frame ``k``, which counts from the end if it is negative. IndexError if there is none."""
+        count = len(self)
+        if not -count <= k < count:
+            raise IndexError(f"{self.path}: frames are 0 to {count - 1}, or {-count} to -1, there is no {shown(k)}")
+        return k % count
 
     @checked_arguments
     def time(self, k: int) -> float:
-        """The time of frame ``k`` [s], 0 the first."""
-        self._check_number(k)
+        """The time of frame ``k`` [s], 0 the first, -1 the last."""
+        k = self._number(k)
         with reading(self.path):
             if not self._is_own:
                 return k / FRAME_RATE
@@ -249,15 +251,15 @@ class Trajectory:
 
     @checked_arguments
     def ledger(self, k: int) -> Ledger | None:
-        """The ledger of frame ``k`` alone, 0 the first; None where the file has none."""
-        self._check_number(k)
+        """The ledger of frame ``k`` alone, 0 the first, -1 the last; None where the file has none."""
+        k = self._number(k)
         with reading(self.path):
             return read_ledger(self._chunks, k) if self._is_own else None
 
     @checked_arguments
     def __getitem__(self, k: int) -> Frame:
-        """Frame ``k``, 0 the first; numbers in the precision of the file, and what it does not keep not a number."""
-        self._check_number(k)
+        """Frame ``k``, 0 the first, -1 the last, in the precision of the file; what that has not is not a number."""
+        k = self._number(k)
         with reading(self.path):
             if not self._is_own:
                 check_same_particles(self._chunks, self.header, k)
