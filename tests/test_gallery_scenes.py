@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
+from scipy.spatial import cKDTree
 from scipy.stats import chisquare
 
 import particlesim as ps
@@ -34,3 +36,38 @@ def test_the_bins_of_a_galton_board_fill_by_the_binomial_law():
     assert chisquare(np.add.reduceat(counts, classes), np.add.reduceat(expected, classes)).pvalue > 0.01
     assert bins.mean() == pytest.approx(0.5 * rows, abs=3.0 * np.sqrt(0.25 * rows / len(x)))
     assert bins.var() == pytest.approx(0.25 * rows, rel=3.0 * np.sqrt(2.0 / len(x)))
+
+
+def test_a_cloud_falls_towards_its_star_as_bodies_do_that_fall_freely():
+    """From rest at R to r = R cos^2 a takes sqrt(R^3 / (2 GM)) (a + sin a cos a), in a straight line."""
+    sim = shown("cloud")
+    start = np.linalg.norm(sim.particles.position, axis=1)
+    direction = sim.particles.position / start[:, np.newaxis]
+    sim.run(duration=1.5)
+    # A touch is an impact or lasts; what has had neither has not been turned by friction.
+    free = (sim.particles.impacts == 0) & (sim.particles.angular_velocity == 0).all(axis=1)
+    assert free.sum() > 500
+    r = np.linalg.norm(sim.particles.position, axis=1)
+    a = np.arccos(np.sqrt(r[free] / start[free]))
+    time = np.sqrt(start[free] ** 3 / (2.0 * sim.scene.fields[0].strength)) * (a + np.sin(a) * np.cos(a))
+    assert np.allclose(time, sim.time, rtol=1e-5, atol=0)
+    assert np.allclose(sim.particles.position[free], (r[:, np.newaxis] * direction)[free], rtol=0, atol=1e-12)
+
+
+def test_the_work_of_a_drum_is_what_its_heap_asks_for():
+    """It holds the heap up on one side: with a torque of dL/dt - m g x, and so with a power of that times its rate."""
+    sim = shown("drum")
+    rate, gravity, mass = sim.scene.obstacles[0].motion.rate, 9.81, sim.particles.mass
+    seconds, samples = 3, 100
+    turning, moments, mixed = [], [], []
+    for k in range(seconds * samples + 1):
+        sim.run_until(k / samples)
+        (x, _, z), (u, _, w) = sim.particles.position.T, sim.particles.velocity.T
+        turning.append((mass * (z * u - x * w) + sim.particles.angular_momentum[:, 1]).sum())
+        moments.append((mass * gravity * x).sum())
+        if k % samples == 0:
+            _, nearest = cKDTree(sim.particles.position).query(sim.particles.position, 7)
+            mixed.append((sim.particles.group[nearest] != sim.particles.group[:, np.newaxis]).mean())
+    held = rate * (turning[-1] - turning[0] - trapezoid(moments, dx=1.0 / samples))
+    assert sim.ledger.work == pytest.approx(held, rel=1e-2)
+    assert mixed[1] < mixed[2] < mixed[3]  # of the nearest six, those of the other colour
