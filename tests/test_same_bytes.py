@@ -10,9 +10,12 @@ import pytest
 import particlesim as ps
 from particlesim.broad_phase import METHODS
 from particlesim.core import parallel
+from particlesim.core.constants import SEGMENT
 from particlesim.jobs import partial_run
 from tests import killed
+from tests.compounds import L
 from tests.worlds import gas
+from tests.worlds import scene as world_of
 
 FRAMES = 10
 
@@ -26,6 +29,32 @@ def scene(broad_phase="octree"):
         friction=0.3,
         movie={"resolution": [96, 64], "fps": 30},
         show={"readout": True, "plot": "energy"},
+        broad_phase=broad_phase,
+    )
+
+
+def flow(broad_phase="octree"):
+    """What comes in above and goes out below, past an obstacle that rests and one that turns, in two segments."""
+    above = {"lower": [-1, -1, 0.8], "upper": [1, 1, 1.4]}
+    pieces = [{"shape": shape, "count": 6, "size": 0.3, "velocity": "rest"} for shape in (L, "cube", "sphere")]
+    coming = [{"shape": shape, "count": 9, "size": 0.12, "rate": 12.0, "region": above} for shape in ("sphere", L)]
+    bar = {"kind": "box", "edges": [2.0, 0.2, 0.4]}
+    turning = {"kind": "spin", "axis": [0, 0.6, 0.8], "rate": 8.0}
+    return world_of(
+        *pieces,
+        size=(3.0, 3.0, 3.0),
+        seed=5,
+        gravity=(0, 0, -9.81),
+        restitution=0.5,
+        friction=0.4,
+        duration=(SEGMENT + 3) / 60,
+        movie={"resolution": [64, 64], "fps": 60},
+        emitters=[{**one, "velocity": [0, 0, -1], "spin": [1, 2, 3]} for one in coming],
+        sinks=[{"region": {"lower": [-1.5, -1.5, -1.5], "upper": [0, 1.5, -1.2]}}],
+        obstacles=[
+            {"shape": bar, "position": [0, 0, -0.4], "motion": turning},
+            {"shape": "cube", "position": [1, 1, -1]},
+        ],
         broad_phase=broad_phase,
     )
 
@@ -48,7 +77,7 @@ def made(path, this=None, threads=None, make=None):
     make(ps.simulate, path / "run.gsd")
     make(ps.render, path / "movie.mp4")
     simulation = ps.Simulation(this, threads=threads)
-    for frame in range(FRAMES):
+    for frame in range(this.frames):
         simulation.run_until(this.time_of(frame))
     return _read(path, simulation.state_hash())
 
@@ -141,3 +170,62 @@ def test_in_several_processes_at_once(tmp_path, straight):
     ]
     states = [process.communicate(scene().model_dump_json(), timeout=300)[0].strip() for process in started]
     assert [_read(folder, state) for folder, state in zip(folders, states, strict=True)] == [straight[0]] * 2
+
+
+@pytest.fixture(scope="module")
+def straight_flow(tmp_path_factory):
+    """Of one run of a flow, and the folder that it is in."""
+    folder = tmp_path_factory.mktemp("flow") / "straight"
+    return made(folder, flow()), folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("threads", [1, 2, 4])
+def test_a_flow_on_any_number_of_threads(tmp_path, straight_flow, few_are_many, threads):
+    assert made(tmp_path / "run", flow(), threads=threads) == straight_flow[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("broad_phase", METHODS)
+def test_a_flow_with_each_broad_phase(tmp_path, straight_flow, broad_phase):
+    found = made(tmp_path / "run", flow(broad_phase))
+    assert (found.state, found.decoded) == (straight_flow[0].state, straight_flow[0].decoded)
+
+
+@pytest.mark.slow
+def test_a_flow_left_amid_and_gone_on_with(tmp_path, straight_flow, monkeypatch):
+    monkeypatch.setattr(partial_run, "_sync", lambda path: None)
+    monkeypatch.setattr(partial_run, "INTERVAL", 0.0)
+    monkeypatch.setattr(partial_run, "_SPARE", 0.0)
+
+    def stop(phase, done, total):
+        if done >= total // 2:
+            raise KeyboardInterrupt
+
+    def leave_and_go_on(job, path):
+        with pytest.raises(KeyboardInterrupt):
+            job(flow(), path, progress=stop)
+        job(flow(), path, resume=True)
+
+    assert made(tmp_path / "left", flow(), make=leave_and_go_on) == straight_flow[0]
+
+
+@pytest.mark.slow
+def test_a_flow_drawn_in_parts_and_by_workers(tmp_path, straight_flow):
+    run = straight_flow[1] / "run.gsd"
+    parts = [tmp_path / f"part{k}.mp4" for k in (1, 2)]
+    for k, part in enumerate(parts, 1):
+        ps.render(run, part, shard=(k, 2))
+    ps.join(parts, tmp_path / "joined.mp4")
+    ps.render(run, tmp_path / "shared.mp4", workers=2)
+    ps.render(run, tmp_path / "alone.mp4")
+    alone = killed.bytes_of(tmp_path / "alone.mp4")
+    assert killed.bytes_of(tmp_path / "joined.mp4") == killed.bytes_of(tmp_path / "shared.mp4") == alone
+
+
+@pytest.mark.slow
+def test_a_flow_comes_goes_and_collides(straight_flow):
+    with ps.open(straight_flow[1] / "run.gsd") as run:
+        last = run.ledger(len(run) - 1)
+    assert last.impacts > 100
+    assert last.released > 9 and last.removed > 0
