@@ -101,6 +101,7 @@ def test_pictures_are_mixed_as_light_is():
     assert np.array_equal(mean_of([every] * 7, of_light=True), every)
 
 
+@pytest.mark.slow
 def test_a_blurred_movie_has_the_same_bytes_however_it_is_made(tmp_path, monkeypatch):
     movie = {"resolution": [64, 64], "fps": 20, "quality": "draft", "shutter": 0.5, "sub_frames": 2}
     some = gas(2, duration=3.05, movie=movie, trajectory={"precision": "double"})
