@@ -91,6 +91,20 @@ def test_a_changed_number_is_found_out(files, tmp_path):
     assert same.exit_code == 0
 
 
+@pytest.mark.parametrize("ending", [".mp4", ".webm", ".gif", ".png"])
+def test_what_is_not_whole_is_refused_though_it_may_say_what_it_is_of(files, scene, tmp_path, ending):
+    whole = files / f"movie{ending}"
+    if not whole.exists():
+        ps.render(scene, whole, frames=range(2, 9, 3))
+    data, cut = whole.read_bytes(), tmp_path / whole.name
+    for size in (len(data) * 2 // 3, len(data) - 1):
+        cut.write_bytes(data[:size])
+        shown = CliRunner().invoke(cli.app, ["info", str(cut)])
+        assert shown.exit_code == 2
+        assert shown.output == f"{cut}: not a whole {ending} file: damaged, cut off, or of another kind\n"
+    assert CliRunner().invoke(cli.app, ["info", str(whole)]).exit_code == 0
+
+
 def test_what_does_not_say_is_refused_in_one_line(files, tmp_path):
     Image.new("RGB", (4, 4)).save(tmp_path / "plain.png")
     (tmp_path / "text.png").write_text("text")

@@ -29,9 +29,11 @@ def info(
     """
     with one_line_errors(file):
         from particlesim.jobs.provenance import read_provenance  # noqa: PLC0415
+        from particlesim.jobs.whole_files import check_whole  # noqa: PLC0415
 
         if verify and file.suffix.lower() != ".gsd":
             raise OptionError(f"--verify: of a trajectory (.gsd), not of {file}")
+        check_whole(file)
         values = read_provenance(file)
         if verify:
             values |= _verified(file, frame, quiet, threads)
