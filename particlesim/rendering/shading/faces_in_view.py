@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from particlesim.core.jit import entry_kernel, kernel, without_refcounts
-from particlesim.core.math3d import axpy, cross, dot, load_vec3, norm, scale, set_vec3, store_vec3, sub
+from particlesim.core.math3d import axpy, cross, dot, load_vec3, norm, scale, set_vec3, store_vec3, sub, to_vec3
 from particlesim.core.parallel import ThreadTeam
 from particlesim.core.records import record
 from particlesim.rendering.visibility.instances import Instances
@@ -88,7 +88,7 @@ def _fill_polyhedron(placed, tables, pixels, edge, view, row):
     distance = norm(body)
     for f in range(shape.first_face, shape.last_face):
         face, out = shapes.face[f], view.face[row]
-        normal = rotated(axes, face.normal)
+        normal = rotated(axes, to_vec3(face.normal))
         offset = dot(normal, centre) + face.offset * size
         if offset < 0.0:
             set_vec3(out.normal, normal)

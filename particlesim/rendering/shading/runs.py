@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import axpy, load_vec3, norm, scale, sub
+from particlesim.core.math3d import axpy, load_vec3, norm, scale, sub, to_vec3
 from particlesim.rendering.visibility.geometry_tables import BALL, drawn_as
 from particlesim.rendering.visibility.scan_lines import rotated, view_rotation
 
@@ -55,7 +55,7 @@ def round_form(which, centre, strip, world):
     shape = shapes.shape[tables.body[i].shape]
     faces, edges = shape.last_face - shape.first_face, shape.last_edge - shape.first_edge
     if p < faces:
-        return centre, _NOWHERE, 0.0, rotated(m, shapes.face[shape.first_face + p].normal)
+        return centre, _NOWHERE, 0.0, rotated(m, to_vec3(shapes.face[shape.first_face + p].normal))
     bend, axis = 1.0 / (shape.rounding * size), _NOWHERE
     if p < faces + edges:
         edge = shapes.edge[shape.first_edge + p - faces]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from particlesim.core.jit import kernel
+from particlesim.core.math3d import to_vec3
 from particlesim.geometry.shape_links import faces_beside
 from particlesim.rendering.visibility.scan_lines import add_line, no_lines, rotated, row_between
 
@@ -85,7 +86,7 @@ def _project_planes(placed, shapes, strip, scratch):
     count, pixel = 0, 1.0 / strip.scale
     for f in range(shape.first_face, shape.last_face):
         face = shapes.face[f]
-        nx, ny, nz = rotated(m, face.normal)
+        nx, ny, nz = rotated(m, to_vec3(face.normal))
         offset = nx * x + ny * y + nz * z + face.offset * size
         if strip.parallel:
             # A plane seen from its edge is as good as one that turns away a little.

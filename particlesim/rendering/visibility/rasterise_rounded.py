@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from particlesim.core.jit import kernel
-from particlesim.core.math3d import axpy, cross, dot, load_vec3, norm, scale, store_vec3, sub
+from particlesim.core.math3d import axpy, cross, dot, load_vec3, norm, scale, store_vec3, sub, to_vec3
 from particlesim.rendering.visibility.rasterise_polyhedron import rasterise_polyhedron_shadow
 from particlesim.rendering.visibility.rasterise_sphere import rasterise_disc, rasterise_near_sphere, rasterise_sphere
 from particlesim.rendering.visibility.scan_lines import add_line, no_lines, rotated, row_between
@@ -70,9 +70,9 @@ def _place(placed, shapes, scratch):
     number, size, centre, m = placed
     shape = shapes.shape[number]
     for v in range(shape.first_vertex, shape.last_vertex):
-        store_vec3(scratch.corner, v, axpy(centre, rotated(m, shapes.vertex[v]), size))
+        store_vec3(scratch.corner, v, axpy(centre, rotated(m, load_vec3(shapes.vertex, v)), size))
     for f in range(shape.first_face, shape.last_face):
-        store_vec3(scratch.normal, f, rotated(m, shapes.face[f].normal))
+        store_vec3(scratch.normal, f, rotated(m, to_vec3(shapes.face[f].normal)))
 
 
 @kernel

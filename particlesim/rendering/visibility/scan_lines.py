@@ -88,7 +88,7 @@ def view_rotation(axes, orientation, i):
 
 @kernel
 def rotated(m, v):
-    """A vector, or a row of an array, in body axes, seen in view axes."""
+    """A vector in body axes, seen in view axes."""
     a, b, c = v[0], v[1], v[2]
     return (
         m[0][0] * a + m[0][1] * b + m[0][2] * c,
