@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +52,9 @@ class Scenery:
         self._size = np.array([o.size if o.shape.is_bounded else 1.0 for o in self._obstacles])
         self._parts = [self._parts_of(k, shape, len(header.shapes) + k) for k, shape in enumerate(header.obstacles)]
         self._obstacle_shapes = np.unique(np.concatenate([[-1], *(part.body["shape"] for part in self._parts)]))
+        self._moves = np.array([bool(o.pieces) for o in self._obstacles], dtype=bool)
+        # The opaque and the clear ones of the last picture: those that stand are the same in the next.
+        self._instances_at = lru_cache(maxsize=2)(self._placed)
         self._colour = obstacle_colours(scene)
         self._opacity = np.array([said.opacity for said in scene.obstacles])
         self.opaque = np.flatnonzero(self._opacity == 1.0)
@@ -69,8 +73,13 @@ class Scenery:
 
     def instances(self, which: np.ndarray, time: float) -> Instances:
         """The obstacles ``which`` (k,) at a time [s]; each triangle of a mesh is one of them by itself."""
+        return self._instances_at(tuple(which.tolist()), time if self._moves[which].any() else 0.0)
+
+    def _placed(self, numbers: tuple[int, ...], time: float) -> Instances:
+        """What ``instances`` are of the obstacles of these numbers."""
+        which = np.array(numbers, dtype=np.int64)
         pose = poses_at(self._obstacles, time)[which]
-        parts = [self._parts[k] for k in which.tolist()]
+        parts = [self._parts[k] for k in numbers]
         each = np.repeat(np.arange(len(which)), [len(part.body) for part in parts])
         body = np.concatenate([np.zeros(0, dtype=BODY), *(part.body for part in parts)])
         middle = np.concatenate([np.zeros((0, 3)), *(part.middle for part in parts)])
