@@ -117,6 +117,22 @@ def test_a_heap_thrown_together_is_worked_through():
     assert sim.ledger.unresolved < 0.01 * sim.steps
 
 
+@pytest.mark.parametrize("step", [1 / 1000, 1 / 240, 1 / 60])
+@pytest.mark.parametrize(("speed", "gravity", "seed"), [(0.0, 9.81, 1), (10.0, 9.81, 5), (10.0, 98.1, 3)])
+def test_nothing_sinks_in_farther_whatever_the_time_step(step, speed, gravity, seed):
+    """Shocks go through heaps that are dropped or thrown into a corner, and deflect more than was expected."""
+    size = 0.08
+    groups = [
+        {"shape": shape, "count": 20, "size": size, "velocity": (0.3 * speed, 0.0, -speed)}
+        for shape in ("sphere", "cube", "tetrahedron")
+    ]
+    box, pull = (0.4, 0.4, 0.8), (0, 0, -gravity)
+    sim = Simulation(scene(*groups, size=box, gravity=pull, restitution=0.3, friction=0.5, seed=seed, step=step))
+    for _ in range(36):
+        sim.run(duration=1 / 60)
+        assert sim.largest_overlap() < 1e-3 * size
+
+
 def test_forces_go_to_the_nearest_points_of_the_same_contact():
     """The corners of a patch come in any order, and may be fewer or more than before; no force is lost."""
     points, terms = np.zeros(4, dtype=CONTACT_POINT), np.zeros(4, dtype=CONTACT_TERMS)

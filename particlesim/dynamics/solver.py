@@ -222,7 +222,7 @@ class Solver:
         if self._respond(duration, anyhow=bisections >= MAX_SUBSTEP_BISECTIONS, again=again):
             with self._spent_on("advance"):
                 self._advance(duration)
-        elif self._resting.loses and duration <= LASTING_STEP and again < MAX_LASTING_ROUNDS:
+        elif self._resting.foreseen and self._resting.loses and duration <= LASTING_STEP and again < MAX_LASTING_ROUNDS:
             # What meets over and over is in lasting contact from then on.
             often, until = self._often, self._until
             if until > 0.0:
@@ -230,7 +230,7 @@ class Solver:
             self.state.lasting[often] = 1
             self._substep(duration - until, bisections, again + 1)
         else:
-            # Too much hangs together, or happens: less does in half the time.
+            # Too much hangs together, or happens, or meets unforeseen: less does in half the time.
             self._substep(0.5 * duration, bisections + 1, again)
             self._substep(0.5 * duration, bisections + 1, again)
 
@@ -257,15 +257,17 @@ class Solver:
         Then it is known what met over and over, and until when it did not, unless that was tried ``again`` and again.
         """
         system, clock, state = self._system, self._clock, self.state
-        paths, kept = Paths(clock, no_segments()), (state.forces, state.lasting.copy())
+        paths = Paths(clock, no_segments())
         with self._spent_on("respond"):
             borne = self._resting.carry(state, duration)
+        if not (self._resting.foreseen or anyhow):
+            self._resting.release(state)
+            return False
         with self._spent_on("contacts"):
             predicted = self._find_contacts(paths, duration)
         few = self._resting.loses and again < MAX_LASTING_ROUNDS
         anyhow = anyhow and not few
-        touched = [newly_touched(clock, predicted.pair, system.particles)]
-        linked = predicted.pair
+        linked, touched = predicted.pair, [newly_touched(clock, predicted.pair, system.particles)]
         rounds = unfinished = 0
         while len(linked) and (anyhow or (rounds < MAX_ISLAND_ROUNDS and not unfinished)):
             with self._spent_on("respond"):
@@ -288,8 +290,7 @@ class Solver:
             self._often = disturbed[clock["stamp"][disturbed] >= FEW_IMPACTS]
             self._until = until if LEAST_PART * duration < until < duration else 0.0
             rewind(paths, system.body, disturbed)
-            self._resting.release()
-            state.forces, state.lasting = kept
+            self._resting.release(state)
             forget(clock, system.body, disturbed)
         self._disturbed = disturbed
         return done

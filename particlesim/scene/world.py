@@ -104,5 +104,6 @@ class Solver(Model):
         ),
     ] = Field(default_factory=lambda: Octree(kind="octree"), description="how pairs that may collide are found")
     time_step: Annotated[Literal["auto"] | PositiveNumber, must_be("'auto' or a number of seconds above 0")] = Field(
-        default="auto", description="how much is computed at once; no impact is missed, whatever it is [s]"
+        default="auto",
+        description="how much is computed at once; no impact is missed, and no overlap larger, whatever it is [s]",
     )

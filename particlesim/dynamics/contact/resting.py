@@ -79,6 +79,7 @@ class RestingContacts:
         self._ahead = np.zeros_like(self._system.body[: len(self._mover)])  # scratch: at the end of the step
         self._member = np.empty(0, dtype=np.int64)
         self._before = system.body[:0]
+        self.foreseen = True  # whether nothing met unforeseen in the last substep
 
     def longest_substep(self, state: SolverState, fields: bool) -> float:
         """How long a substep may be [s] with what is in lasting contact, or soon may be; whether there are fields."""
@@ -97,7 +98,8 @@ class RestingContacts:
 
     def carry(self, state: SolverState, duration: float) -> Borne:
         """Carry what is in lasting contact through a substep of ``duration`` [s]: its velocity changes."""
-        self._member = self._member[:0]
+        self._member, self.foreseen = self._member[:0], True
+        self._known_before = state.forces, state.lasting.copy()
         state.standing[:] = 0
         if not self.known:
             return NOTHING_BORNE
@@ -160,8 +162,8 @@ class RestingContacts:
             searches += 1
             carried = motion.held.copy()
             carried[system.particles :] = carried[islands.member] = True
-            foreseen = not unforeseen(system, neighbours, motion, search, self._ahead, carried)
-            if foreseen or searches == MAX_CONTACT_SEARCHES:
+            self.foreseen = not unforeseen(system, neighbours, motion, search, self._ahead, carried)
+            if self.foreseen or searches == MAX_CONTACT_SEARCHES:
                 break
             found = changes_ahead(system, motion.spin, duration, islands.member, self._ahead)
             motion = motion._replace(change=np.maximum(CHANGE_MARGIN * motion.change, CHANGE_MARGIN * found))
@@ -169,7 +171,7 @@ class RestingContacts:
         # What is less does not sink in by more than is corrected.
         counts = max(self._pull * duration, CORRECTED_DEPTH * self._inradius * RESTING_SUBSTEPS / duration)
         woken = unbalanced(system, means, motion.held, state.asleep, (WAKE_BALANCE, SLEEP_SPEED))
-        return islands, search, woken, not foreseen or left > UNRESOLVED_VELOCITY * counts
+        return islands, search, woken, not self.foreseen or left > UNRESOLVED_VELOCITY * counts
 
     def _presses(self, state: SolverState, points: np.ndarray) -> np.ndarray:
         """Which contact points (m,) are on sleepers."""
@@ -261,8 +263,9 @@ class RestingContacts:
         """Whether anything was."""
         return len(self._member) > 0
 
-    def release(self) -> None:
-        """Undo what the last ``carry`` did to the bodies."""
+    def release(self, state: SolverState) -> None:
+        """Undo what the last ``carry`` did to the bodies, and to what is known of their contacts."""
+        state.forces, state.lasting = self._known_before
         if not self.carried:
             return
         for name in ("velocity", "angular_momentum"):
