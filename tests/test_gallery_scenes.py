@@ -71,3 +71,20 @@ def test_the_work_of_a_drum_is_what_its_heap_asks_for():
     held = rate * (turning[-1] - turning[0] - trapezoid(moments, dx=1.0 / samples))
     assert sim.ledger.work == pytest.approx(held, rel=1e-2)
     assert mixed[1] < mixed[2] < mixed[3]  # of the nearest six, those of the other colour
+
+
+def test_cubes_on_a_conveyor_go_as_fast_as_its_surface():
+    """What has slid v / (mu g) long, as what lies farther on has, goes at v in its direction and does not turn."""
+    sim = shown("conveyor")
+    belt, edge = sim.scene.obstacles[0], 0.1
+    top, end = 0.05, 0.4  # of the belt
+    sim.run(duration=6.0)
+    x, _, z = sim.particles.position.T
+    carried = (np.abs(z - top - 0.5 * edge) < 1e-3) & (x > -0.4) & (x < end - edge)
+    assert carried.sum() >= 5
+    assert np.allclose(sim.particles.velocity[carried], belt.surface_velocity, rtol=0, atol=1e-3)
+    assert np.allclose(sim.particles.angular_velocity[carried], 0.0, rtol=0, atol=1e-2)
+    # The others make a heap: where it is highest they lie on each other.
+    beyond = x > end + edge
+    assert beyond.sum() > 0.4 * len(x)
+    assert z[beyond].max() > -0.5 + 2.0 * edge
