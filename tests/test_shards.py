@@ -49,6 +49,17 @@ def test_joined_it_is_the_movie_drawn_at_once(folder, tmp_path):
     assert origin == read_provenance(folder / "movie.mp4") == read_provenance(tmp_path / "joined.mp4")
 
 
+@pytest.mark.parametrize("pictures", [121, 122, 123])
+def test_a_last_segment_of_few_pictures_is_as_long_as_they_are(folder, tmp_path, pictures):
+    """Too few for pictures out of order: seams within and between parts are the same."""
+    frames = range(pictures)
+    ps.render(folder / "run.gsd", tmp_path / "movie.mp4", frames=frames)
+    for k in (1, 2):
+        ps.render(folder / "run.gsd", tmp_path / f"part{k}.mp4", frames=frames, shard=(k, 2))
+    ps.join([tmp_path / "part1.mp4", tmp_path / "part2.mp4"], tmp_path / "joined.mp4")
+    assert (tmp_path / "joined.mp4").read_bytes() == (tmp_path / "movie.mp4").read_bytes()
+
+
 def test_parts_say_what_they_are_of(folder):
     found = [read_provenance(part) for part in parts(folder, 1, 2, 3)]
     assert [values["frames"] for values in found] == [[0, 60, 1], [60, 120, 1], [120, 190, 1]]

@@ -15,6 +15,10 @@ _LIST = "segments.txt"
 _MP4 = ["-movflags", "+faststart", "-write_btrt", "0", "-f", "mp4"]
 _WEBM = ["-f", "webm"]
 
+# Each picture is shown as long as the first: in a file that was joined, that before a segment too short to have
+# pictures in another order (H.264's B frames) seems to last until their delay is made up for, and the movie longer.
+_EVEN = ["-bsf:v", "setts=pts=PTS:dts=DTS:duration=if(eq(N\\,0)\\,st(0\\,DURATION)\\,ld(0))"]
+
 # Hundredths of a second are the least that a GIF tells pictures apart by, and viewers slow down what goes faster than
 # two of them.
 _GIF_RATE = "fps=min(source_fps\\,50)"
@@ -34,7 +38,7 @@ def join_files(folder: Path, names: Sequence[str], path: Path, tags: Mapping[str
         return
     muxer = _WEBM if path.suffix.lower() == ".webm" else _MP4
     written = [word for name, text in tags.items() for word in ("-metadata", f"{name}={text}")]
-    _joined(folder, ["-c", "copy", *written, *muxer], path)
+    _joined(folder, ["-c", "copy", *_EVEN, *written, *muxer], path)
 
 
 def pictures_in(path: Path) -> int:
