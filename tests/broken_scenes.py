@@ -57,7 +57,7 @@ BROKEN = [
     ),
     (
         GOOD + "[movie]\nframerate = 3\n",
-        "movie.framerate = 3: unknown key; allowed: fps, speed, quality, resolution, background, crf, fade",
+        "movie.framerate = 3: unknown key; allowed: fps, speed, quality, resolution, background, crf, fade, shutter, sub_frames",
     ),
     (GROUP, "the key 'world' is missing"),
     (group(shape=None), "particles[0]: the key 'shape' is missing"),
