@@ -49,10 +49,10 @@ def rims_of(shapes: Sequence[Shape], table: ShapeTable) -> Rims:
     before = np.arange(len(table.loop)) - 1
     before[table.face["first"]] = table.face["last"] - 1
     corner, start = np.arange(len(table.loop)), np.zeros(len(table.loop))
-    seen = np.ones(len(table.loop), dtype=bool)
+    faces = table.shape["last_face"] - table.shape["first_face"]
+    of_triangle = np.repeat(table.shape["kind"] == TRIANGLE, faces)  # of each face, as they are row by row
+    seen = np.repeat(~of_triangle, corners)
     end, middle = np.ones(len(table.loop)), np.zeros((len(table.shape), 3))
-    for row in np.flatnonzero(table.shape["kind"] == TRIANGLE).tolist():
-        seen[_corners(table, row)] = False
     pieces = []
     for own, (shape, row) in enumerate(zip(shapes, table.shape, strict=False)):
         # A compound's own faces are those of the box about it, which is not drawn.
