@@ -169,8 +169,8 @@ def borne_impulses(system, points, terms):
 
 
 @entry_kernel
-def _forces(points, terms, bodies, duration):
-    """The forces that act at contact points (m,), as FORCE: in the end, or means of a ``duration`` [s] > 0."""
+def _forces(points, terms, contact, duration):
+    """The forces that act at the points (m,) of contacts, as FORCE: in the end, or means of a ``duration`` [s] > 0."""
     points, terms = without_refcounts((points, terms))
     forces, size = np.empty(len(points), dtype=FORCE), 0
     for k in range(len(points)):
@@ -182,7 +182,7 @@ def _forces(points, terms, bodies, duration):
             force, torque, arm = scale(force, -1.0), scale(torque, -1.0), vec(p.arm_b)
         if dot(force, force) > 0.0:
             f = forces[size]
-            f.contact = min(p.a, p.b) * bodies + max(p.a, p.b)
+            f.contact = contact[k]
             set_vec3(f.arm, arm)
             set_vec3(f.force, force)
             set_vec3(f.torque, torque)
@@ -192,9 +192,9 @@ def _forces(points, terms, bodies, duration):
 
 def forces_after(islands: Islands, bodies: int) -> np.ndarray:
     """The forces of contact points for the step after, (m,) FORCE: those that there are."""
-    return _forces(islands.points, islands.terms, bodies, 0.0)
+    return _forces(islands.points, islands.terms, _contact_of(islands.points, bodies), 0.0)
 
 
 def mean_forces(islands: Islands, bodies: int, duration: float) -> np.ndarray:
     """The forces of contact points in the step, which took ``duration`` [s], (m,) FORCE: those that there were."""
-    return _forces(islands.points, islands.terms, bodies, duration)
+    return _forces(islands.points, islands.terms, _contact_of(islands.points, bodies), duration)
